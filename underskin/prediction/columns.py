@@ -15,7 +15,7 @@ import numpy as np
 
 from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement, wrong_type
 from underskin.recordings.readers import template_columns, text
-from underskin.recordings.readers.template_columns import MAGNITUDE, PHASE
+from underskin.recordings.readers.template_columns import MAGNITUDE, PHASE, OtherColumn
 from underskin.units import Floats, Mask
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -157,16 +157,19 @@ def from_csv(data: bytes, field_names: Collection[str]) -> CsvColumns:
     parts: dict[str, CsvColumn] = {}
     meanings = template_columns.fields_of(table.header, field_names)
     for index, (heading, cells, meant) in enumerate(zip(table.header, columns, meanings, strict=True)):
+        is_known = meant is not None and meant[0] in (*field_names, *polar)
+        other = OtherColumn.of(() if is_known else cells, decimal)
         if meant is None and polar and template_columns.is_phase_without_unit(heading):
-            meant = PHASE, _angle(heading, cells, decimal, result.notes)
+            meant = PHASE, _angle(heading, other.largest)
+            result.notes.append(f"{heading!r} {template_columns.READ_AS_DEGREES}")
         if meant is not None and meant[0] in (*field_names, *polar):
             field, factor = meant
             if field in (fields := parts if field in polar else result.fields):
                 raise _twice(field, fields[field].heading, heading)
             fields[field] = CsvColumn(heading, cells, table.lines, factor, decimal)
-        elif _only_counts(index, heading, cells):
+        elif other.only_counts(index, heading):
             continue
-        elif _is_label(heading, cells, decimal):
+        elif _is_named_label(heading) or (heading and not other.has_numbers):
             if heading in result.labels:
                 raise CsvError(f"must name each column once; its header has {heading!r} twice")
             result.labels[heading] = cells
@@ -187,15 +190,12 @@ def _twice(field: str, first: str, second: str) -> CsvError:
     return CsvError(f"must name each field once; its header has {field!r} twice: {twice}")
 
 
-def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -> float:
-    """The factor to rad of a phase without a unit, by its values; adds a note."""
-    numbers = [abs(number) for cell in cells if (number := _number(cell, decimal)) is not None]
+def _angle(heading: str, largest: float) -> float:
+    """The factor to rad of a phase without a unit, by the largest of its values."""
     try:
-        factor = template_columns.angle_by_values(heading, max(numbers, default=0.0))
+        return template_columns.angle_by_values(heading, largest)
     except ValueError as error:
         raise CsvError(f"has a phase that is not clear: {error}") from None
-    notes.append(f"{heading!r} {template_columns.READ_AS_DEGREES}")
-    return factor
 
 
 def _real_part(parts: Mapping[str, CsvColumn]) -> CsvColumn:
@@ -247,23 +247,9 @@ def _notes_under(table: list[list[str]], lines: list[int]) -> list[str]:
     return notes
 
 
-def _only_counts(index: int, heading: str, cells: Sequence[str]) -> bool:
-    """Whether it is an index of the rows, as spreadsheets write it, or an empty column."""
-    if heading.lower() not in template_columns.NO_NAME:
-        return False
-    counts = [[str(first + row) for row in range(len(cells))] for first in (0, 1)]
-    return not any(cells) or (index == 0 and list(cells) in counts)
-
-
 def _is_named_label(heading: str) -> bool:
     lower = heading.lower()
     return lower in _LABELS or lower.startswith(template_columns.FURTHER)
-
-
-def _is_label(heading: str, cells: Sequence[str], decimal: str) -> bool:
-    if _is_named_label(heading):
-        return True
-    return bool(heading) and all(_number(cell, decimal) is None for cell in cells)
 
 
 def _number(cell: str, decimal: str) -> float | None:
