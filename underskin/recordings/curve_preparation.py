@@ -98,7 +98,8 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
             reversed_columns, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled, bends_as_other=bends_as_other
         )
     deep = _deep_side(force, travel, turns, relative_sign)
-    side = deep or _first_movement(travel)
+    moved = travel - travel[0]
+    side = deep or (1 if moved[np.argmax(np.abs(moved) > RETURN * np.ptp(moved))] > 0 else -1)  # as it first moves
     negative = ((FORCE, relative_sign * side < 0), (TRAVEL, side < 0))
     return Orientation(tuple(name for name, falls in negative if falls), turns, is_deep_end_known=deep != 0)
 
@@ -193,12 +194,6 @@ def _stiffness(force: Floats, travel: Floats, turn: int, leg: tuple[int, int], n
     slope = float(moved @ force[chosen]) / square
     rest = force[chosen] - force[chosen].mean() - slope * moved
     return slope, float(rest.std() / np.sqrt(square))
-
-
-def _first_movement(travel: Floats) -> int:
-    """1 where the travel first grows, -1 where it falls."""
-    moved = travel - travel[0]
-    return 1 if moved[np.argmax(np.abs(moved) > RETURN * np.ptp(moved))] > 0 else -1
 
 
 def findings(campaign: Campaign) -> list[Finding]:

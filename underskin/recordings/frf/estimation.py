@@ -15,7 +15,7 @@ Force and charge look exchanged where the charge has the declared mean and oscil
 not.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -149,8 +149,13 @@ def _total(parts: Sequence[_Weighted]) -> float:
 
 def _in_phase(parts: Sequence[_Weighted], delays: Floats) -> Floats:
     """The share of the power that is in phase or in antiphase at each delay [s] of the charge."""
-    powers = (_power(stack.frequency, factors, delays) for stack, factors in parts)
-    return sum(powers, np.zeros(len(delays))) / _total(parts)
+    power = np.zeros(len(delays))
+    for first in range(0, len(delays), _CHUNK):
+        chunk = delays[first : first + _CHUNK]
+        for stack, factors in parts:
+            turned = factors @ np.exp(2j * np.pi * np.outer(stack.frequency, chunk))
+            power[first : first + _CHUNK] += (turned.real**2).sum(axis=0)
+    return power / _total(parts)
 
 
 def _best_delay(parts: Sequence[_Weighted]) -> tuple[float, float]:
@@ -162,7 +167,8 @@ def _best_delay(parts: Sequence[_Weighted]) -> tuple[float, float]:
     delays: Floats = step * np.arange(-(count // 2), count // 2 + 1).astype(np.float64)
     for _ in range(3):
         power = _in_phase(parts, delays)
-        best = delays[_nearest_peak(delays, power)]
+        peaks = delays[power >= power.max() * (1 - 1e-9)]  # few lines cannot resolve them
+        best = peaks[np.argmin(np.abs(peaks))]
         delays = np.asarray(best + np.arange(-_STEPS, _STEPS + 1) * (step / _STEPS), dtype=np.float64)
         step /= _STEPS
     return float(best), float(power.max())
@@ -183,27 +189,6 @@ def advanced(values: Complexes, frequency: Floats, delay: float) -> Complexes:
 def _phase_factors(values: Complexes) -> Complexes:
     valid = np.isfinite(values) & (values != 0)
     return np.where(valid, np.exp(1j * np.angle(np.where(valid, values, 1.0))), 0.0)
-
-
-def _power(frequency: Floats, factors: Complexes, delays: Floats) -> Floats:
-    """Σ over recordings of (Re Σ over lines of factors · e^(2πifτ))² at each delay."""
-    return np.concatenate(
-        [
-            ((factors @ np.exp(2j * np.pi * np.outer(frequency, chunk))).real ** 2).sum(axis=0)
-            for chunk in _chunks(delays)
-        ]
-    )
-
-
-def _chunks(delays: Floats) -> Iterator[Floats]:
-    for first in range(0, len(delays), _CHUNK):
-        yield delays[first : first + _CHUNK]
-
-
-def _nearest_peak(delays: Floats, power: Floats) -> int:
-    """The index of the peak nearest to 0 among those nearly as high as the highest: few lines cannot resolve them."""
-    peaks = np.flatnonzero(power >= power.max() * (1 - 1e-9))
-    return int(peaks[np.argmin(np.abs(delays[peaks]))])
 
 
 _BLOCKS = 15  # half-overlapping blocks of a broadband record by default: a resolution of 8 / its length
