@@ -382,14 +382,10 @@ def _with_spring(channels: dict[str, Any], columns: Sequence[Column], properties
     if "force_n" in channels or not springs or travel is None:
         return channels
     deflection = {"channel": springs[0]}
-    constant = next((name for name in properties if _is_stiffness(labelled_unit(name))), None)
+    labels = {name: unit(labelled_unit(name)) for name in properties}
+    constant = next((name for name, label in labels.items() if label and label.dimension == "force/length"), None)
     force = {"force_n": {**deflection, "spring_constant_n_per_m": {"property": constant}}} if constant else {}
     return {**channels, "displacement_mm": {"channel": travel, "deflection": deflection}, **force}
-
-
-def _is_stiffness(label: str) -> bool:
-    parsed = unit(label)
-    return parsed is not None and parsed.dimension == "force/length"
 
 
 def missing(document: Mapping[str, Any]) -> list[str]:
