@@ -133,34 +133,24 @@ _FAR = 8.0  # deviations
 _LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are considered
 
 
-def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, position: Floats) -> Mask:
-    """Which recordings lie more than 8 robust deviations from their sensor's d33, less the effect of their condition.
+def outlying(rows: "RecordingD33", position: Floats) -> Indices:
+    """The recordings inside that lie more than 8 robust deviations from their sensor's d33, less the effect of their
+    condition; `position` (recordings,): the relative deviation of each for a sphere misplaced as far as is usual.
 
     Where all recordings of a sensor do, the sensor is off and none of its recordings is an outlier.
-
-    Parameters
-    ----------
-    sensor, condition : (recordings,) arrays of int
-        The number of each recording's sensor, and of its condition (indenter and preload).
-    d33, noise : (recordings,) arrays
-        d33 of each recording and its standard uncertainty by line noise [C/N].
-    position : (recordings,) array
-        Relative deviation of each recording for the largest usual misplacement of the sphere.
-
-    Returns
-    -------
-    (recordings,) array of bool
     """
+    good = np.flatnonzero(rows.inside)
+    sensor, d33 = rows.sensor[good], rows.d33[good]
     array = typical_size(d33)
     relative = _over_usual(sensor, d33, array)
-    residual = relative - _common(sensor, condition, relative, float(np.median(relative)))
+    residual = relative - _common(sensor, rows.condition[good], relative, float(np.median(relative)))
     scatter = ROBUST * float(np.median(np.abs(residual)))
-    expected = np.hypot(np.hypot(_LEAST_DEVIATION, position), noise / array)
+    expected = np.hypot(np.hypot(_LEAST_DEVIATION, position[good]), rows.d33_uncertainty[good] / array)
     far: Mask = np.abs(residual) > _FAR * np.maximum(scatter, expected)
     for index in np.unique(sensor[far]):
         if far[sensor == index].all():
             far[sensor == index] = False
-    return far
+    return good[far]
 
 
 def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
@@ -218,8 +208,7 @@ def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
     """A finding where the band of d33 lies behind a filter."""
     if behind is None:
         return []
-    corners = {"high_pass_hz": behind.filters.high_hz, "low_pass_hz": behind.filters.low_hz}
-    arguments = {**corners, "percent": 100 * behind.share, "low_hz": zone.low_hz, "high_hz": zone.high_hz}
+    arguments = {**behind.arguments, "low_hz": zone.low_hz, "high_hz": zone.high_hz}
     return [Finding(Reason.BEHIND_FILTER, "", "d33_pc_per_n", arguments)]
 
 
@@ -238,8 +227,7 @@ def _own_filters(
     for index in np.flatnonzero(of_line > _NOISY * usual).tolist():
         behind = roll_off([stack.of(sensor[stack.rows] == index) for stack in stacks], zone, level)
         if behind is not None:
-            corners = {"high_pass_hz": behind.filters.high_hz, "low_pass_hz": behind.filters.low_hz}
-            flags[index] = Flag(ids[index], Reason.SENSOR_BEHIND_FILTER, {**corners, "percent": 100 * behind.share})
+            flags[index] = Flag(ids[index], Reason.SENSOR_BEHIND_FILTER, behind.arguments)
     return flags
 
 
@@ -513,7 +501,7 @@ def _estimated(
 ) -> Inversion:
     moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
     mean, variance = (np.array(part) for part in zip(*moments, strict=True))
-    outliers = _outliers(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
+    outliers = outlying(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
     far_off = [
         Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": value})
         for row, value in zip(outliers, to_lab("d33_pc_per_n", rows.d33[outliers]).tolist(), strict=True)
@@ -572,13 +560,6 @@ def _scatter_finding(model: MixedModel) -> Finding | None:
         return Finding(Reason.SCATTER_AT_LIMIT, "", "frf", {"percent": percent})
     arguments = {"percent": percent, "usual": 100 * usual}
     return Finding(Reason.UNUSUAL_SCATTER, "", "frf", arguments) if float(model.gain.low) > usual else None
-
-
-def _outliers(rows: RecordingD33, position: Floats) -> Indices:
-    """The rows inside with outlying d33; `position` as for `outlying`."""
-    good = np.flatnonzero(rows.inside)
-    d33, noise = rows.d33[good], rows.d33_uncertainty[good]
-    return good[outlying(rows.sensor[good], rows.condition[good], d33, noise, position[good])]
 
 
 def _expected_scatter(model: MixedModel, rows: LevelRows) -> Floats:

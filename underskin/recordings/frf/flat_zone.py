@@ -483,6 +483,12 @@ class RollOff:
     filters: "Filters"
     share: float
 
+    @property
+    def arguments(self) -> dict[str, float]:
+        """The corners and the loss as findings state them."""
+        corners = {"high_pass_hz": self.filters.high_hz, "low_pass_hz": self.filters.low_hz}
+        return {**corners, "percent": 100 * self.share}
+
 
 def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff | None:
     """The filters that attenuate the band; None where it reaches their plateau. `level` (recordings,): the average over
