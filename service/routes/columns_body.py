@@ -14,7 +14,7 @@ from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
 from service.schemas.columns import ColumnsRequest
 from underskin.errors import ErrorCode, FileError, InvalidInput, conflicting, wrong_type
-from underskin.prediction.columns import CsvColumn, CsvError, RealPart, from_csv
+from underskin.prediction.columns import CsvColumn, CsvError, from_csv
 from underskin.recordings.reading import sheet_text
 
 try:
@@ -178,7 +178,7 @@ def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[
     }, UploadedNames(parsed.labels, parsed.notes)
 
 
-def _cells(kind: type[ColumnsRequest], name: str, column: CsvColumn | RealPart) -> Any:
+def _cells(kind: type[ColumnsRequest], name: str, column: CsvColumn) -> Any:
     if name in kind.lists:
         raise wrong_type(name, column.cells[0], f"cannot be sent as CSV; send application/json or {NPZ}")
     return _constant(name, column.cells) if name in kind.constants else column.numbers(name)

@@ -59,7 +59,7 @@ def adhesive(start_mm: float, end_mm: float, force: int, travel: int) -> Indenta
 def test_pulls_sphere_way_out_tells_no_sign(start_mm: float, end_mm: float, force: int, travel: int) -> None:
     """What pulls a sphere on its way out tells no sign."""
     expected = tuple(name for name, sign in zip(NAMES, (force, travel), strict=True) if sign < 0)
-    assert curve_preparation.counted_negative(adhesive(start_mm, end_mm, force, travel)) == expected
+    assert curve_preparation.orientation(adhesive(start_mm, end_mm, force, travel)).negative == expected
 
 
 @pytest.mark.parametrize(("force", "travel"), SIGNS)

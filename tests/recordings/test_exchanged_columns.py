@@ -11,8 +11,8 @@ from underskin.errors import InvalidInput
 from underskin.inversion import elastomer
 from underskin.inversion.invert import NoD33, invert
 from underskin.recordings import plausibility
-from underskin.recordings.campaign import Campaign, IndentationRecording, parse
-from underskin.recordings.curve_preparation import look_exchanged
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, parse
+from underskin.recordings.curve_preparation import are_exchanged
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 
@@ -174,9 +174,12 @@ def test_displacement_begins_late_not_exchanged(strain: float) -> None:
     load = ((1 - strains) ** -2 - (1 - strains)) / 3
     load += 1e-3 * load.max() * rng.normal(size=500)
     late = np.interp(np.maximum(steady, 0.0) * load.max(), np.sort(load), np.sort(strains))
-    assert not look_exchanged(late + 1e-3 * strain * rng.normal(size=500), steady, sphere=False)
-    assert not look_exchanged(strain * steady, load, sphere=False)
-    assert look_exchanged(load, strain * steady, sphere=False) == (strain > 0.05)
+    for displacement, force, expected in (
+        (late + 1e-3 * strain * rng.normal(size=500), steady, False),
+        (strain * steady, load, False),
+        (load, strain * steady, strain > 0.05),
+    ):
+        assert are_exchanged(CompressionRecording("block", 10.0, 10.0, displacement, force_n=force)) == expected
 
 
 def test_block_pressed_height_gives_no_modulus() -> None:

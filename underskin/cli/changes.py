@@ -4,7 +4,7 @@ The originals stay; nothing is deleted.
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,10 @@ from underskin.cli.rigs import EstimatorOption, RigOption
 from underskin.cli.store import LOCAL, KeyOption, Url, connect, outcome, results_of
 from underskin.cli.stored import AsJson, Document, moment, write_json, write_rows
 from underskin.errors import UnderskinError
+
+if TYPE_CHECKING:
+    from underskin.client.campaigns import Campaigns, Skins
+    from underskin.client.service_client import Client
 
 Reason = Annotated[str, typer.Option(help="Why; kept, and shown with all that leaves it out.")]
 CampaignArgument = Annotated[str, typer.Argument(help="Id of the campaign.")]
@@ -124,24 +128,18 @@ def annotate(
     key: KeyOption = None,
 ) -> None:
     """Name a campaign or a skin, or change its notes or tags; what is not given stays."""
-    _require_exactly_one(campaign, skin)
+    identity = _one_of(campaign, skin)
     name_field = "name" if campaign is not None else "title"
     values = {name_field: name, "remark": notes, "tags": None if tags is None else tags.split(",")}
     fields = {field: value for field, value in values.items() if value is not None}
     if not fields:
         raise UnderskinError("give at least one of --name, --notes and --tags")
-    document: Document
     with connect(url, key) as client:
-        if campaign is not None:
-            document = client.campaigns.annotate(campaign, **fields)
-        else:
-            document = client.skins.annotate(str(skin), **fields)
-    if json:
-        write_json(document)
-        return
+        document = _resource(client, campaign).annotate(identity, **fields)
     remarks = [f"tags: {', '.join(document['tags'])}"] if document["tags"] else []
     remarks += [f"notes: {document['remark']}"] if document["remark"] else []
-    typer.echo("; ".join([f"{_noun(campaign, skin)} is called {document[name_field] or document['id']}", *remarks]))
+    called = f"{_noun(campaign, skin)} is called {document[name_field] or document['id']}"
+    _say(document, "; ".join([called, *remarks]), json)
 
 
 def discard(
@@ -153,17 +151,10 @@ def discard(
     key: KeyOption = None,
 ) -> None:
     """Put a trial campaign that nothing builds on, or a skin without campaigns in use, into no list any more."""
-    _require_exactly_one(campaign, skin)
-    document: Document
+    identity = _one_of(campaign, skin)
     with connect(url, key) as client:
-        if campaign is not None:
-            document = client.campaigns.discard(campaign, reason)
-        else:
-            document = client.skins.discard(str(skin), reason)
-    if json:
-        write_json(document)
-    else:
-        typer.echo(f"{_noun(campaign, skin)} is discarded; it can still be read, and that can be undone")
+        document = _resource(client, campaign).discard(identity, reason)
+    _say(document, f"{_noun(campaign, skin)} is discarded; it can still be read, and that can be undone", json)
 
 
 def changes(
@@ -174,9 +165,9 @@ def changes(
     key: KeyOption = None,
 ) -> None:
     """What was changed of a campaign or of a skin itself, the latest first, and what can be undone."""
-    _require_exactly_one(campaign, skin)
+    identity = _one_of(campaign, skin)
     with connect(url, key) as client:
-        entries = client.campaigns.changes(campaign) if campaign is not None else client.skins.changes(str(skin))
+        entries = _resource(client, campaign).changes(identity)
     if json:
         write_json(entries)
         return
@@ -193,11 +184,7 @@ def undo(
     """Take a change back, as long as nothing builds on it; both stay on record."""
     with connect(url, key) as client:
         document = client.undo(change)
-    if json:
-        write_json(document)
-    else:
-        noun = _noun(document["campaign_id"], document["skin_id"])
-        typer.echo(f"undone of {noun}: {document['statement']}")
+    _say(document, f"undone of {_noun(document['campaign_id'], document['skin_id'])}: {document['statement']}", json)
 
 
 def _row(change: Document) -> tuple[str, ...]:
@@ -206,10 +193,17 @@ def _row(change: Document) -> tuple[str, ...]:
     return change["id"], moment(change["at"]), change["statement"], by, why, undoing
 
 
+def _resource(client: "Client", campaign: str | None) -> "Campaigns | Skins":
+    return client.skins if campaign is None else client.campaigns
+
+
 def _noun(campaign: str | None, skin: str | None) -> str:
     return f"skin {skin}" if campaign is None else f"campaign {campaign}"
 
 
-def _require_exactly_one(campaign: str | None, skin: str | None) -> None:
-    if (campaign is None) == (skin is None):
+def _one_of(campaign: str | None, skin: str | None) -> str:
+    """The id of the one that is given."""
+    given = [identity for identity in (campaign, skin) if identity is not None]
+    if len(given) != 1:
         raise UnderskinError("give one of --campaign ID and --skin ID")
+    return given[0]

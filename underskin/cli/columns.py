@@ -79,7 +79,7 @@ def gather(
         if values and name in in_file:
             raise not_unique(name, ",".join(values), f"is also a column of {path}; give it once")
         if values:
-            columns[name] = _from_option(name, values)
+            columns[name] = _numbers(name, [cell for value in values for cell in value.split(",")])
         elif name in in_file:
             columns[name] = in_file[name]
         elif name in defaults:
@@ -89,11 +89,6 @@ def gather(
             option = "--" + name.replace("_", "-")
             raise UnderskinError(f"{name} is missing: give {option}, or a column {name} in the CSV file of --input")
     return columns, labels
-
-
-def _from_option(name: str, values: Sequence[str]) -> Floats:
-    numbers = _numbers(name, [cell for value in values for cell in value.split(",")])
-    return numbers if numbers.size > 1 else numbers.reshape(())
 
 
 def _from_csv(path: str, sheet: str | None, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
@@ -194,13 +189,14 @@ def write_findings(findings: Sequence[Finding]) -> None:
 
 
 def _numbers(name: str, cells: Sequence[str]) -> Floats:
+    """The numbers (cells,) of an option; of a single one its shape is ()."""
     numbers = np.empty(len(cells))
     for row, cell in enumerate(cells):
         try:
             numbers[row] = float(cell)
         except ValueError:
             raise wrong_type(name, cell, index=row if len(cells) > 1 else None) from None
-    return numbers
+    return numbers if numbers.size > 1 else numbers.reshape(())
 
 
 def _unit(name: str) -> str:

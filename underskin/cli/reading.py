@@ -94,7 +94,7 @@ def _rows(contents: "Contents", taken: Mapping[str, str]) -> Iterator[tuple[str,
             values = f"{shown}{', …' if len(column.texts) > _MOST_TEXTS else ''} ({len(column.texts)} different)"
             yield column.name, "", values, taken.get(column.name, "")
         for channel in block.channels[:_MOST_LISTED]:
-            numbers = np.abs(channel.values) if np.iscomplexobj(channel.values) else channel.values
+            numbers = np.abs(channel.values) if channel.is_complex else channel.values
             finite = numbers[np.isfinite(numbers)]
             span = f"{finite.min():.5g} to {finite.max():.5g}" if len(finite) else "no numbers"
             label = channel.label or "?"

@@ -20,7 +20,7 @@ the array's d33. Findings are used.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -31,7 +31,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
-from underskin.inversion.mixed_model import ROBUST, SDS_OF_95, Estimate, LevelRows, MixedModel
+from underskin.inversion.mixed_model import ROBUST, Estimate, LevelRows, MixedModel
 from underskin.inversion.noted_conditions import NotedConditions, noted_conditions
 from underskin.inversion.sensor_flags import (
     ENOUGH,
@@ -58,7 +58,7 @@ from underskin.prediction.pressed_skin import (
 )
 from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
-from underskin.recordings.frf.estimation import exchanged_channels, lines_of
+from underskin.recordings.frf.estimation import exchanged_channels
 from underskin.recordings.frf.flat_zone import (
     FlatZone,
     RollOff,
@@ -68,7 +68,8 @@ from underskin.recordings.frf.flat_zone import (
     roll_off,
     without_chain_phase,
 )
-from underskin.recordings.frf.line_choice import excited_at_mains, gain_findings, noise_findings, usable_lines
+from underskin.recordings.frf.line_choice import excited_at_mains, gain_findings, noise_findings
+from underskin.recordings.frf.series_lines import chosen_lines, of_spoilt
 from underskin.recordings.frf.spectra import Frf, Stack, left_out_of, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
@@ -132,34 +133,24 @@ _FAR = 8.0  # deviations
 _LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are considered
 
 
-def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, position: Floats) -> Mask:
-    """Which recordings lie more than 8 robust deviations from their sensor's d33, less the effect of their condition.
+def outlying(rows: "RecordingD33", position: Floats) -> Indices:
+    """The recordings inside that lie more than 8 robust deviations from their sensor's d33, less the effect of their
+    condition; `position` (recordings,): the relative deviation of each for a sphere misplaced as far as is usual.
 
     Where all recordings of a sensor do, the sensor is off and none of its recordings is an outlier.
-
-    Parameters
-    ----------
-    sensor, condition : (recordings,) arrays of int
-        The number of each recording's sensor, and of its condition (indenter and preload).
-    d33, noise : (recordings,) arrays
-        d33 of each recording and its standard uncertainty by line noise [C/N].
-    position : (recordings,) array
-        Relative deviation of each recording for the largest usual misplacement of the sphere.
-
-    Returns
-    -------
-    (recordings,) array of bool
     """
+    good = np.flatnonzero(rows.inside)
+    sensor, d33 = rows.sensor[good], rows.d33[good]
     array = typical_size(d33)
     relative = _over_usual(sensor, d33, array)
-    residual = relative - _common(sensor, condition, relative, float(np.median(relative)))
+    residual = relative - _common(sensor, rows.condition[good], relative, float(np.median(relative)))
     scatter = ROBUST * float(np.median(np.abs(residual)))
-    expected = np.hypot(np.hypot(_LEAST_DEVIATION, position), noise / array)
+    expected = np.hypot(np.hypot(_LEAST_DEVIATION, position[good]), rows.d33_uncertainty[good] / array)
     far: Mask = np.abs(residual) > _FAR * np.maximum(scatter, expected)
     for index in np.unique(sensor[far]):
         if far[sensor == index].all():
             far[sensor == index] = False
-    return far
+    return good[far]
 
 
 def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
@@ -217,8 +208,7 @@ def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
     """A finding where the band of d33 lies behind a filter."""
     if behind is None:
         return []
-    corners = {"high_pass_hz": behind.filters.high_hz, "low_pass_hz": behind.filters.low_hz}
-    arguments = {**corners, "percent": 100 * behind.share, "low_hz": zone.low_hz, "high_hz": zone.high_hz}
+    arguments = {**behind.arguments, "low_hz": zone.low_hz, "high_hz": zone.high_hz}
     return [Finding(Reason.BEHIND_FILTER, "", "d33_pc_per_n", arguments)]
 
 
@@ -237,8 +227,7 @@ def _own_filters(
     for index in np.flatnonzero(of_line > _NOISY * usual).tolist():
         behind = roll_off([stack.of(sensor[stack.rows] == index) for stack in stacks], zone, level)
         if behind is not None:
-            corners = {"high_pass_hz": behind.filters.high_hz, "low_pass_hz": behind.filters.low_hz}
-            flags[index] = Flag(ids[index], Reason.SENSOR_BEHIND_FILTER, {**corners, "percent": 100 * behind.share})
+            flags[index] = Flag(ids[index], Reason.SENSOR_BEHIND_FILTER, behind.arguments)
     return flags
 
 
@@ -322,14 +311,7 @@ class Inversion:
     @property
     def absolute_d33(self) -> Estimate | None:
         """`campaign_d33` with the tolerances of the declared skin, independent of the scatter."""
-        relative = self.campaign_d33
-        if relative is None:
-            return None
-        off = abs(relative.value) * self.declared_percent / 100
-        half = SDS_OF_95 * off
-        low = relative.value - np.hypot(relative.value - relative.low, half)
-        high = relative.value + np.hypot(relative.high - relative.value, half)
-        return Estimate(relative.value, np.hypot(relative.uncertainty, off), low, high)
+        return None if self.campaign_d33 is None else self.campaign_d33.wider(self.declared_percent / 100)
 
     def wider(self, relative: float) -> "Inversion":
         """With a further relative uncertainty common to all its d33."""
@@ -456,7 +438,7 @@ def _measured(
 ) -> tuple[list[Frf], list[FrfRecording], list[Finding], list[Finding]]:
     """The usable lines of each recording with an FRF, these recordings, findings on the others, and findings on those
     that are used: channels that look exchanged although the units were checked, and forces at the mains alone."""
-    frfs, recordings, left_out, findings = [], [], [], []
+    recordings, left_out, findings = list[FrfRecording](), list[Finding](), list[Finding]()
     for recording in recorded:
         exchanged = exchanged_channels(recording)
         if exchanged is not None and units_checked:
@@ -473,18 +455,11 @@ def _measured(
             arguments = {"largest": beyond.largest, "low": beyond.low, "high": beyond.high}
             left_out.append(Finding(Reason.IMPOSSIBLE_RECORDING, recording.id, beyond.field, arguments))
             continue
-        try:
-            frfs.append(lines_of(recording))
-            recordings.append(recording)
-        except InvalidInput as refusal:
-            left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
-    chosen = dict(zip((recording.id for recording in recordings), usable_lines(frfs), strict=True))
-    for name, mains_hz in [(name, lines.all_spoilt_by_hz) for name, lines in chosen.items() if lines.all_spoilt_by_hz]:
-        left_out.append(Finding(Reason.MAINS_SPOIL_ALL, name, "charge_pc", {"mains_hz": mains_hz}))
-        del chosen[name]
-    for name, defect in [(name, lines.overload) for name, lines in chosen.items() if lines.overload is not None]:
-        left_out.append(Finding(Reason.DEFECT, name, defect.channel, asdict(defect)))
-        del chosen[name]
+        recordings.append(recording)
+    chosen, refused = chosen_lines(recordings, Reason.NO_FRF)
+    spoilt = {name: why for name, lines in chosen.items() if (why := of_spoilt(name, lines)) is not None}
+    left_out += [*refused, *spoilt.values()]
+    chosen = {name: lines for name, lines in chosen.items() if name not in spoilt}
     findings += excited_at_mains(chosen)
     used = [recording for recording in recordings if recording.id in chosen]
     return [lines.frf for lines in chosen.values()], used, left_out, findings
@@ -526,7 +501,7 @@ def _estimated(
 ) -> Inversion:
     moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
     mean, variance = (np.array(part) for part in zip(*moments, strict=True))
-    outliers = _outliers(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
+    outliers = outlying(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
     far_off = [
         Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": value})
         for row, value in zip(outliers, to_lab("d33_pc_per_n", rows.d33[outliers]).tolist(), strict=True)
@@ -585,13 +560,6 @@ def _scatter_finding(model: MixedModel) -> Finding | None:
         return Finding(Reason.SCATTER_AT_LIMIT, "", "frf", {"percent": percent})
     arguments = {"percent": percent, "usual": 100 * usual}
     return Finding(Reason.UNUSUAL_SCATTER, "", "frf", arguments) if float(model.gain.low) > usual else None
-
-
-def _outliers(rows: RecordingD33, position: Floats) -> Indices:
-    """The rows inside with outlying d33; `position` as for `outlying`."""
-    good = np.flatnonzero(rows.inside)
-    d33, noise = rows.d33[good], rows.d33_uncertainty[good]
-    return good[outlying(rows.sensor[good], rows.condition[good], d33, noise, position[good])]
 
 
 def _expected_scatter(model: MixedModel, rows: LevelRows) -> Floats:

@@ -20,17 +20,7 @@ REL_ERROR = 1e-10
 def gamma_n(offset: ArrayLike, rho: ArrayLike) -> Floats:
     """Stress factor γ_n of a normal point force, T3 = −(3/2πh²) F3 γ_n, averaged over the sensor's disc (equation 6).
 
-    Parameters
-    ----------
-    offset : array_like
-        λ = r̂/h [-].
-    rho : array_like
-        ρ = rT/h [-].
-
-    Returns
-    -------
-    ndarray
-        [-], of the broadcast shape; (1 + λ²)^(−5/2) at ρ = 0.
+    Parameters and result as in `elastic_layer.gamma_n`; (1 + λ²)^(−5/2) of λ = r̂/h at ρ = 0.
     """
     return normal_stress(_normal, np.ones_like, 0.0, rho, offset)
 
@@ -57,19 +47,7 @@ def delta(a: ArrayLike) -> Floats:
 def sigma(a: ArrayLike, rho: ArrayLike, offset: ArrayLike = 0.0) -> Floats:
     """Transmission factor σ(a/h, ρ) of the half space: Hertz pressure on an extended sensor (equation 14).
 
-    Parameters
-    ----------
-    a : array_like
-        Contact radius a/h [-].
-    rho : array_like
-        ρ = rT/h [-].
-    offset : array_like
-        Distance r̂/h of the load from the centre of the sensor [-].
-
-    Returns
-    -------
-    ndarray
-        [-], of the broadcast shape.
+    Parameters and result as in `elastic_layer.sigma`.
     """
     return normal_stress(_normal, hertz_transform, a, rho, offset)
 

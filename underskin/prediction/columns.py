@@ -8,14 +8,14 @@ import csv
 import io
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement, wrong_type
 from underskin.recordings.readers import template_columns, text
-from underskin.recordings.readers.template_columns import MAGNITUDE, PHASE
+from underskin.recordings.readers.template_columns import MAGNITUDE, PHASE, OtherColumn
 from underskin.units import Floats, Mask
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -85,16 +85,22 @@ class CsvError(ValueError):
 @dataclass(frozen=True)
 class CsvColumn:
     """One column: its heading as written, the cells, the lines of the text on which they stand (from 1), the factor to
-    the unit of its field, and the decimal mark."""
+    the unit of its field, and the decimal mark; of the magnitude of an FRF, whose real part is taken, its `phase`."""
 
     heading: str
     cells: Sequence[str]
     lines: Sequence[int]
     factor: float
     decimal: str
+    phase: "CsvColumn | None" = None
 
     def numbers(self, field: str) -> list[float]:
-        """Its values in the field's unit; raises InvalidInput that names the field, the row and the line."""
+        """Its values in the field's unit; raises InvalidInput that names the field, or magnitude or phase, the row and
+        the line."""
+        if self.phase is not None:
+            magnitude = replace(self, phase=None).numbers(MAGNITUDE)
+            phase = self.phase.numbers(self.phase.heading)
+            return [size * math.cos(angle) for size, angle in zip(magnitude, phase, strict=True)]
         values = [_number(cell, self.decimal) for cell in self.cells]
         if None in values:
             raise self._refused(field, [row for row, value in enumerate(values) if value is None])
@@ -109,34 +115,11 @@ class CsvColumn:
 
 
 @dataclass(frozen=True)
-class RealPart:
-    """The real part of an FRF in columns of its magnitude [pC/N] and its phase [rad]."""
-
-    magnitude: CsvColumn
-    phase: CsvColumn
-
-    @property
-    def heading(self) -> str:
-        """Both headings as written."""
-        return f"{self.magnitude.heading}, {self.phase.heading}"
-
-    @property
-    def cells(self) -> Sequence[str]:
-        """The cells of the magnitude."""
-        return self.magnitude.cells
-
-    def numbers(self, _field: str) -> list[float]:
-        """Its values in pC/N; raises InvalidInput that names magnitude or phase, the row and the line."""
-        polar = zip(self.magnitude.numbers(MAGNITUDE), self.phase.numbers(self.phase.heading), strict=True)
-        return [size * math.cos(angle) for size, angle in polar]
-
-
-@dataclass(frozen=True)
 class CsvColumns:
     """The columns by field; by heading, the cells of `unknown` columns, which hold numbers and name no field, and of
     `labels`, which only label rows; `notes`: what was left out or interpreted."""
 
-    fields: dict[str, CsvColumn | RealPart]
+    fields: dict[str, CsvColumn]
     unknown: dict[str, list[str]]
     labels: dict[str, list[str]]
     notes: list[str]
@@ -174,16 +157,19 @@ def from_csv(data: bytes, field_names: Collection[str]) -> CsvColumns:
     parts: dict[str, CsvColumn] = {}
     meanings = template_columns.fields_of(table.header, field_names)
     for index, (heading, cells, meant) in enumerate(zip(table.header, columns, meanings, strict=True)):
+        is_known = meant is not None and meant[0] in (*field_names, *polar)
+        other = OtherColumn.of(() if is_known else cells, decimal)
         if meant is None and polar and template_columns.is_phase_without_unit(heading):
-            meant = PHASE, _angle(heading, cells, decimal, result.notes)
+            meant = PHASE, _angle(heading, other.largest)
+            result.notes.append(f"{heading!r} {template_columns.READ_AS_DEGREES}")
         if meant is not None and meant[0] in (*field_names, *polar):
             field, factor = meant
             if field in (fields := parts if field in polar else result.fields):
                 raise _twice(field, fields[field].heading, heading)
             fields[field] = CsvColumn(heading, cells, table.lines, factor, decimal)
-        elif _only_counts(index, heading, cells):
+        elif other.only_counts(index, heading):
             continue
-        elif _is_label(heading, cells, decimal):
+        elif _is_named_label(heading) or (heading and not other.has_numbers):
             if heading in result.labels:
                 raise CsvError(f"must name each column once; its header has {heading!r} twice")
             result.labels[heading] = cells
@@ -204,23 +190,21 @@ def _twice(field: str, first: str, second: str) -> CsvError:
     return CsvError(f"must name each field once; its header has {field!r} twice: {twice}")
 
 
-def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -> float:
-    """The factor to rad of a phase without a unit, by its values; adds a note."""
-    numbers = [abs(number) for cell in cells if (number := _number(cell, decimal)) is not None]
+def _angle(heading: str, largest: float) -> float:
+    """The factor to rad of a phase without a unit, by the largest of its values."""
     try:
-        factor = template_columns.angle_by_values(heading, max(numbers, default=0.0))
+        return template_columns.angle_by_values(heading, largest)
     except ValueError as error:
         raise CsvError(f"has a phase that is not clear: {error}") from None
-    notes.append(f"{heading!r} {template_columns.READ_AS_DEGREES}")
-    return factor
 
 
-def _real_part(parts: Mapping[str, CsvColumn]) -> RealPart:
+def _real_part(parts: Mapping[str, CsvColumn]) -> CsvColumn:
     """The real part from magnitude and phase; raises CsvError where one is missing."""
     if len(parts) == 1:
         ((field, column),) = parts.items()
         raise CsvError(f"must have magnitude and phase of an FRF: {column.heading!r} {template_columns.lacking(field)}")
-    return RealPart(parts[MAGNITUDE], parts[PHASE])
+    heading = f"{parts[MAGNITUDE].heading}, {parts[PHASE].heading}"
+    return replace(parts[MAGNITUDE], heading=heading, phase=parts[PHASE])
 
 
 def _table(data: bytes) -> _Table:
@@ -263,23 +247,9 @@ def _notes_under(table: list[list[str]], lines: list[int]) -> list[str]:
     return notes
 
 
-def _only_counts(index: int, heading: str, cells: Sequence[str]) -> bool:
-    """Whether it is an index of the rows, as spreadsheets write it, or an empty column."""
-    if heading.lower() not in template_columns.NO_NAME:
-        return False
-    counts = [[str(first + row) for row in range(len(cells))] for first in (0, 1)]
-    return not any(cells) or (index == 0 and list(cells) in counts)
-
-
 def _is_named_label(heading: str) -> bool:
     lower = heading.lower()
     return lower in _LABELS or lower.startswith(template_columns.FURTHER)
-
-
-def _is_label(heading: str, cells: Sequence[str], decimal: str) -> bool:
-    if _is_named_label(heading):
-        return True
-    return bool(heading) and all(_number(cell, decimal) is None for cell in cells)
 
 
 def _number(cell: str, decimal: str) -> float | None:

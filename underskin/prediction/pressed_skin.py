@@ -20,7 +20,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.physics import charge_response, hertz
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
-from underskin.recordings.campaign import FrfRecording, SkinDescription
+from underskin.recordings.campaign import Conditions, FrfRecording, SkinDescription, offsets
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import ContactModel
 from underskin.units import GRAM_FORCE, Floats, Mask, to_si
@@ -317,11 +317,7 @@ PICK_UP = 0.02
 
 def contact_offsets(skin: SkinDescription, recorded: Sequence[FrfRecording]) -> Floats:
     """The distance of each contact from the centre of its recording's sensor [m]."""
-    centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in skin.sensors}
-    offsets = [
-        np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
-    ]
-    return to_si("thickness_mm", offsets)
+    return np.hypot(*offsets(Conditions("", skin, tuple(recorded))).T)
 
 
 def response_shares(skin: SkinDescription, recorded: Sequence[FrfRecording], contact_model: ContactModel) -> Floats:

@@ -32,6 +32,11 @@ class Channel:
         """The unit as labelled, or in its name: `Force (lbs)`; empty without one."""
         return self.unit or labelled_unit(self.name)
 
+    @property
+    def is_complex(self) -> bool:
+        """Whether its values are complex."""
+        return np.iscomplexobj(self.values)
+
 
 @dataclass(frozen=True, eq=False)
 class TextColumn:

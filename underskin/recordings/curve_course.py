@@ -273,7 +273,12 @@ def _landmarks(*columns: bytes) -> CurveLandmarks:
     least = np.maximum(_BEYOND_JUMP * noise, _LEAST_JUMP * span)
     snap_in, pull_off = _jumps_of_contact(force, turn, noise, block)
     arrive, leave = _hold(displacement, turn)
-    drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
+    way_in = slice(turn + 1)
+    drifting = (
+        None if snap_in is not None else _straight_air(displacement[way_in], force[way_in], time[way_in], noise, 1.0)
+    )
+    if drifting is not None and not _is_plausible_drift(displacement, force, time, turn + 1, noise, *drifting):
+        drifting = None
     drifting_after = None
     if drifting is None and snap_in is None and pull_off is None:
         drifting_after = _drifting_after(displacement, force, time, leave, noise)
@@ -438,16 +443,6 @@ def _air(force: Floats, turn: int, snap_in: int | None, pull_off: int | None, no
     return np.arange(pull_off, len(force)) if pull_off is not None else np.zeros(0, dtype=np.intp)
 
 
-def _drifting_air(
-    displacement: Floats, force: Floats, time: Floats, count: int, noise: float
-) -> tuple[int, float] | None:
-    """The number of the first `count` samples (the approach) before contact, and the drift of the force per time; None
-    without a significant drift. See `_straight_air`.
-    """
-    air = _straight_air(displacement[:count], force[:count], time[:count], noise, 1.0)
-    return air if air is not None and _is_plausible_drift(displacement, force, time, count, noise, *air) else None
-
-
 def _drifting_after(
     displacement: Floats, force: Floats, time: Floats, leave: int, noise: float
 ) -> tuple[int, float] | None:
@@ -602,16 +597,13 @@ def apparent_mpa(curve: CurveRecording, poisson_ratio: float) -> float:
 
 
 def _of_sphere(curve: IndentationRecording, displacement: Floats, force: Floats, poisson_ratio: float) -> float:
-    load, moved = _indentation_from_contact(displacement, force)
-    return float(0.75 * (1 - poisson_ratio**2) * load / (np.sqrt(curve.indenter_radius_mm) * moved**1.5))
-
-
-def _indentation_from_contact(displacement: Floats, force: Floats) -> tuple[float, float]:
-    """Force and indentation of a sphere at its deepest sample, from the contact point: the approach through air may be
-    long, and adhesion may exceed the load. NaN (and 1) where the sphere is not pressed."""
+    """At the deepest sample, from the contact point: the approach through air may be long, and adhesion may exceed the
+    load."""
     landmarks = curve_landmarks(displacement, force)
     load, moved = float(force[landmarks.turn]) - landmarks.zero, pressed_depth(displacement, force)
-    return (load, moved) if load > 0 and moved > 0 else (float("nan"), 1.0)
+    if not (load > 0 and moved > 0):
+        return float("nan")
+    return float(0.75 * (1 - poisson_ratio**2) * load / (np.sqrt(curve.indenter_radius_mm) * moved**1.5))
 
 
 def _of_cylinder(curve: CompressionRecording, displacement: Floats, force: Floats, _: float) -> float:

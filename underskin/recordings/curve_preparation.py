@@ -15,7 +15,7 @@ material does that: by Hertz depth grows as F^(2/3), never with an exponent abov
 as it is: it may be in tension.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ import numpy as np
 from underskin.errors import unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import Campaign, CurveRecording, samples_of
+from underskin.recordings.campaign import Campaign, CurveRecording, finite_rows, samples_of
 from underskin.recordings.curve_course import PACE, RETURN, is_one_sided, roughness, turning_points
 from underskin.recordings.damaged_readings import force_step, marks, reading_steps, spikes, without_damaged
 from underskin.recordings.periodic_error import periodic_error
@@ -62,11 +62,6 @@ class Orientation:
 _UNKNOWN = Orientation((), np.zeros(0, dtype=np.intp), is_deep_end_known=False)
 
 
-def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
-    """The columns among `force_n` and `displacement_mm` that fall during loading."""
-    return orientation(recording).negative
-
-
 def orientation(recording: CurveRecording) -> Orientation:
     """The signs of a recording by its finite samples; `turns` are indices among these. Signs that are checked hold."""
     force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
@@ -103,7 +98,8 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
             reversed_columns, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled, bends_as_other=bends_as_other
         )
     deep = _deep_side(force, travel, turns, relative_sign)
-    side = deep or _first_movement(travel)
+    moved = travel - travel[0]
+    side = deep or (1 if moved[np.argmax(np.abs(moved) > RETURN * np.ptp(moved))] > 0 else -1)  # as it first moves
     negative = ((FORCE, relative_sign * side < 0), (TRAVEL, side < 0))
     return Orientation(tuple(name for name, falls in negative if falls), turns, is_deep_end_known=deep != 0)
 
@@ -200,12 +196,6 @@ def _stiffness(force: Floats, travel: Floats, turn: int, leg: tuple[int, int], n
     return slope, float(rest.std() / np.sqrt(square))
 
 
-def _first_movement(travel: Floats) -> int:
-    """1 where the travel first grows, -1 where it falls."""
-    moved = travel - travel[0]
-    return 1 if moved[np.argmax(np.abs(moved) > RETURN * np.ptp(moved))] > 0 else -1
-
-
 def findings(campaign: Campaign) -> list[Finding]:
     """One finding for the first curve of each kind and set of negative columns, with the number of further ones."""
     return _counted((curve, orientation(curve)) for curve in campaign.curves)
@@ -229,8 +219,8 @@ def _counted(curves: Iterable[tuple[CurveRecording, Orientation]]) -> list[Findi
 
 def turned(campaign: Campaign) -> tuple[Campaign, int]:
     """The campaign with negative columns of its curves sign-reversed, and the number of curves changed."""
-    changed = sum(bool(counted_negative(curve)) for curve in campaign.curves)
-    return campaign.with_curves(lambda curve: with_turned(curve, counted_negative(curve))), changed
+    negative = {curve.id: orientation(curve).negative for curve in campaign.curves}
+    return campaign.with_curves(lambda curve: with_turned(curve, negative[curve.id])), sum(map(bool, negative.values()))
 
 
 def as_other_load(campaign: Campaign) -> Campaign | None:
@@ -269,14 +259,10 @@ def reject_exchanged_columns(recording: CurveRecording) -> None:
 
 
 def are_exchanged(recording: CurveRecording) -> bool:
-    """Whether force and displacement of a curve look exchanged."""
-    return look_exchanged(recording.displacement_mm, recording.force_n, sphere=recording.has_sphere)
-
-
-def look_exchanged(displacement: Floats, force: Floats, *, sphere: bool) -> bool:
-    """Whether `force` (samples,) moves like a stage and `displacement` like a force; without samples in the air this
-    can be decided for a `sphere` only."""
-    if len(displacement) != len(force) or not np.ptp(displacement) or not np.ptp(force):
+    """Whether the force of a curve moves like a stage, and its displacement like a force; without samples in the air
+    this can be decided for a sphere only."""
+    displacement, force = recording.displacement_mm, recording.force_n
+    if not np.ptp(displacement) or not np.ptp(force):
         return False
     excursion = np.abs(force - force[0])
     end = int(np.argmax(excursion >= _WAY_IN * excursion.max())) + 1
@@ -286,7 +272,7 @@ def look_exchanged(displacement: Floats, force: Floats, *, sphere: bool) -> bool
     if roughness(travel) / np.ptp(travel) > roughness(load) / max(np.ptp(load), 1e-300):
         return False
     stands = _stands_first(load, travel)
-    if sphere:
+    if recording.has_sphere:
         return stands > 0 or _follows(load, travel)
     return stands > 0 and _lags(load[stands:], travel[stands:])
 
@@ -302,7 +288,10 @@ def _stands_first(load: Floats, travel: Floats) -> int:
     stands = int(places[np.argmax(moved) - 1])
     if stands < _STANDS * len(load) or moved[np.argmax(moved) :].mean() < _STAYS:
         return 0
-    return stands if _is_steady(travel[:stands]) and _is_alike(travel, stands) else 0
+    first, middle, last, end = travel[[0, stands // 2, stands - 1, -1]].tolist()
+    is_steady = _are_alike(middle - first, last - middle)
+    goes_on = _are_alike((last - first) / stands, (end - last) / (len(travel) - stands + 1))
+    return stands if is_steady and goes_on else 0
 
 
 def _lags(load: Floats, travel: Floats) -> bool:
@@ -315,16 +304,9 @@ def _lags(load: Floats, travel: Floats) -> bool:
     return end != start and (half - start) / (end - start) < _LAGS
 
 
-def _is_steady(way: Floats) -> bool:
-    """Whether both halves of a path have one direction and about one speed."""
-    first, second = way[len(way) // 2] - way[0], way[-1] - way[len(way) // 2]
+def _are_alike(first: float, second: float) -> bool:
+    """Whether two speeds of a stage have one direction and about one size."""
     return bool(first * second > 0 and 1 / _STEADY < first / second < _STEADY)
-
-
-def _is_alike(way: Floats, at: int) -> bool:
-    """Whether the parts of a path before and after a sample have one direction and about one speed."""
-    before, after = (way[at - 1] - way[0]) / at, (way[-1] - way[at - 1]) / (len(way) - at + 1)
-    return bool(before * after > 0 and 1 / _STEADY < before / after < _STEADY)
 
 
 def _follows(load: Floats, travel: Floats) -> bool:
@@ -456,12 +438,15 @@ def prepared(campaign: Campaign) -> PreparedCurves:
         if are_exchanged(curve):
             return curve
         curve, of_damage = without_damaged(curve)
-        curve, of_saturation = _without_saturation(curve)
-        findings.extend((*of_damage, *of_saturation))
+        curve, of_saturation = _corrected(curve, _without_saturation)
         oriented = orientation(curve)
         oriented_curves.append((curve, oriented))
-        for step in (_turned, _forwards, _without_steps, _until_force_step, _without_periodic_error):
-            curve, curve_findings = step(curve, oriented)
+        curve, of_order = _forwards(
+            curve if oriented.may_be_pulled else with_turned(curve, oriented.negative), oriented
+        )
+        findings.extend((*of_damage, *of_saturation, *of_order))
+        for step in (_without_steps, _until_force_step, _without_periodic_error) if curve.has_sphere else ():
+            curve, curve_findings = _corrected(curve, step)
             findings.extend(curve_findings)
         return curve
 
@@ -469,10 +454,13 @@ def prepared(campaign: Campaign) -> PreparedCurves:
     return PreparedCurves(changed_campaign, (*_counted(oriented_curves), *findings))
 
 
-def _turned(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
-    if oriented.may_be_pulled:
-        return curve, []
-    return with_turned(curve, oriented.negative), []
+_Step = Callable[[CurveRecording, Indices, Floats, Floats], tuple[CurveRecording, list[Finding]]]
+
+
+def _corrected(curve: CurveRecording, step: _Step) -> tuple[CurveRecording, list[Finding]]:
+    """A curve after a step, which takes its finite samples: their rows, travel and force."""
+    rows = finite_rows(curve)
+    return (curve, []) if len(rows) < _LEAST else step(curve, rows, curve.displacement_mm[rows], curve.force_n[rows])
 
 
 def _forwards(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
@@ -496,11 +484,9 @@ def _is_backwards(curve: CurveRecording) -> bool:
     return bool(abs(force[-1]) < _UNLOADED * abs(force[0]))
 
 
-def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Finding]]:
-    finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
-    if len(finite) < _LEAST:
-        return curve, []
-    travel, force = curve.displacement_mm[finite], curve.force_n[finite]
+def _without_saturation(
+    curve: CurveRecording, finite: Indices, travel: Floats, force: Floats
+) -> tuple[CurveRecording, list[Finding]]:
     at_limit, limits = saturated(travel, force, sphere=curve.has_sphere)
     if not at_limit.any():
         return curve, []
@@ -513,11 +499,10 @@ def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Fin
     return samples_of(curve, unsaturated), [Finding(Reason.FORCE_SATURATES, curve.id, "force_n", arguments)]
 
 
-def _without_steps(curve: CurveRecording, _: Orientation) -> tuple[CurveRecording, list[Finding]]:
-    finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
-    if not curve.has_sphere or len(finite) < _LEAST:
-        return curve, []
-    steps = reading_steps(curve.displacement_mm[finite], curve.force_n[finite])
+def _without_steps(
+    curve: CurveRecording, finite: Indices, travel: Floats, force: Floats
+) -> tuple[CurveRecording, list[Finding]]:
+    steps = reading_steps(travel, force)
     if not steps.any():
         return curve, []
     displacement = np.array(curve.displacement_mm, dtype=float)
@@ -529,12 +514,10 @@ def _without_steps(curve: CurveRecording, _: Orientation) -> tuple[CurveRecordin
     return corrected, [Finding(Reason.READING_STEPS, curve.id, "displacement_mm", arguments)]
 
 
-def _until_force_step(curve: CurveRecording, _: Orientation) -> tuple[CurveRecording, list[Finding]]:
+def _until_force_step(
+    curve: CurveRecording, finite: Indices, travel: Floats, force: Floats
+) -> tuple[CurveRecording, list[Finding]]:
     """The samples before a leap of the force alone: those after it are not of the same contact or grip."""
-    finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
-    if len(finite) < _LEAST:
-        return curve, []
-    travel, force = curve.displacement_mm[finite], curve.force_n[finite]
     sample = force_step(travel, force)
     if sample is None:
         return curve, []
@@ -547,13 +530,9 @@ def _until_force_step(curve: CurveRecording, _: Orientation) -> tuple[CurveRecor
     return samples_of(curve, finite[:sample]), [Finding(Reason.FORCE_STEPS, curve.id, "force_n", arguments)]
 
 
-def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
-    if not curve.has_sphere:
-        return curve, []
-    finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
-    if len(finite) < _LEAST:
-        return curve, []
-    travel, force = curve.displacement_mm[finite], curve.force_n[finite]
+def _without_periodic_error(
+    curve: CurveRecording, finite: Indices, travel: Floats, force: Floats
+) -> tuple[CurveRecording, list[Finding]]:
     error = periodic_error(travel, force)
     if error is None:
         return curve, []
@@ -567,7 +546,7 @@ def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tup
         "amplitude_n": error.amplitude,
         "percent": 100 * error.amplitude / force_range,
     }
-    if curve.time_s is not None and len(oriented.turns) <= _TURNS_OF_ONE_WAY:
+    if curve.time_s is not None and len(turning_points(travel)) <= _TURNS_OF_ONE_WAY:
         duration = abs(float(curve.time_s[finite[-1]] - curve.time_s[finite[0]]))
         arguments["frequency_hz"] = float(np.ptp(travel)) / error.period / max(duration, 1e-300)
     return replace(curve, force_n=corrected), [Finding(Reason.PERIODIC_ERROR, curve.id, "force_n", arguments)]

@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import CurveRecording, samples_of
+from underskin.recordings.campaign import CurveRecording, finite_rows, samples_of
 from underskin.recordings.curve_course import roughness
 from underskin.units import Floats, Mask
 
@@ -18,7 +18,7 @@ def without_damaged(curve: CurveRecording) -> tuple[CurveRecording, list[Finding
     """The curve without marks and spikes among its finite forces, and the findings on them."""
     findings = []
     for detect, reason in ((marks, Reason.READINGS_MARKED), (spikes, Reason.READINGS_BEYOND)):
-        finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
+        finite = finite_rows(curve)
         force = curve.force_n[finite]
         bad = detect(force)
         if bad.any():

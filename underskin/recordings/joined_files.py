@@ -16,6 +16,7 @@ from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
 from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.regular_samples import OFF_SAMPLE, mean_step
+from underskin.units import Floats
 
 
 def files_to_join(file: Path, join: tuple[str, tuple[str, ...]]) -> Iterator[Path]:
@@ -56,8 +57,7 @@ def joined(contents: Contents, others: Mapping[str, Contents], file: str) -> Con
 def _joined(first: Block, second: Block, file: str, other: str) -> tuple[Block, str]:
     """A part with the channels of the other, each with its start and rate unless both have one clock; and a note
     where they are taken to begin together."""
-    clocks = [_clock(block) for block in (first, second)]
-    times = [np.zeros(0) if clock is None else clock.values.real * _seconds(clock) for clock in clocks]
+    clocks, times = zip(*(_clock(block) for block in (first, second)), strict=True)
     added = [channel for channel in second.channels if channel is not clocks[1]]
     texts = (*first.texts, *(words for words in second.texts if first.words(words.name) is None))
     lengths = [max((len(channel.values) for channel in block.channels), default=0) for block in (first, second)]
@@ -90,16 +90,13 @@ def _joined(first: Block, second: Block, file: str, other: str) -> tuple[Block, 
     return replace(first, channels=with_distinct_names(timed), texts=texts, sample_rate_hz=None), note
 
 
-def _clock(block: Block) -> Channel | None:
-    """The column of times of a part, of which there is one."""
-    times = [channel for channel in block.channels if (label := unit(channel.label)) and label.dimension == "time"]
-    return times[0] if len(times) == 1 and len(times[0].values) > 1 else None
-
-
-def _seconds(clock: Channel) -> float:
-    label = unit(clock.label)
-    assert label is not None
-    return label.to_si
+def _clock(block: Block) -> tuple[Channel | None, Floats]:
+    """The column of times of a part, of which there is one, and these [s]; empty without one."""
+    labels = [(channel, unit(channel.label)) for channel in block.channels]
+    times = [(channel, label.to_si) for channel, label in labels if label is not None and label.dimension == "time"]
+    if len(times) != 1 or len(times[0][0].values) < 2:
+        return None, np.zeros(0)
+    return times[0][0], times[0][0].values.real * times[0][1]
 
 
 def _rate(block: Block, time: np.ndarray) -> float | None:

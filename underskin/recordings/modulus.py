@@ -13,6 +13,7 @@ punch or with a compliant stage, 3/2 under a small sphere, 2 under a cone, above
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -218,10 +219,14 @@ def _foot(law: Callable[[Floats], Floats], strain: Floats, stress: Floats, noise
         return _with_zero(columns, stress, weight)[1]
 
     span = float(np.ptp(strain))
-    guesses = span * np.linspace(-_FOOT_RANGE, _FOOT_RANGE, _FEET)
-    best = int(np.argmin([misfit(float(guess)) for guess in guesses]))
-    around = float(guesses[max(best - 1, 0)]), float(guesses[min(best + 1, _FEET - 1)])
-    return float(minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-9 * span}).x)
+    return _least(misfit, span * np.linspace(-_FOOT_RANGE, _FOOT_RANGE, _FEET), 1e-9 * span)[0]
+
+
+def _least(misfit: Callable[[float], float], guesses: Floats, error: float) -> tuple[float, int]:
+    """Where the misfit is least, to within an error, near the best of rising guesses; and the index of that."""
+    best = int(np.argmin([misfit(guess) for guess in guesses.tolist()]))
+    around = float(guesses[max(best - 1, 0)]), float(guesses[min(best + 1, len(guesses) - 1)])
+    return float(minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": error}).x), best
 
 
 def _with_zero(columns: Floats, stress: Floats, weight: float) -> tuple[Floats, float]:
@@ -426,20 +431,19 @@ def indentation_modulus(
     Raises InvalidInput where the loading branch has too few points, does not load, or does not determine the modulus,
     where it is deeper than the law holds, and where it follows no sphere's law.
     """
-    depth, load = loading_branch(displacement, force)
-    fit, used = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
+    pressed = _Pressed.of(displacement, force, radius, poisson_ratio, thickness)
+    fit, used = pressed.by_sphere
     if fit.at_bound:
         allowed = "must show where contact begins: record from the air, or deeper, so that the force bends"
         raise unusable("displacement_mm", None, allowed)
-    result = _modulus(depth, load, fit, radius, poisson_ratio, used, thickness)
+    result = pressed.modulus()
     require_depth(result)
-    tip = _tip(depth, load, fit, thickness)
+    tip = pressed.tip()
     if tip is not None:
         raise tip.refusal
     if softening is None:
         return result
-    softer = _as_deep(depth, load, radius, used, poisson_ratio, softening)
-    more = float(softer.fitted[0] - fit.fitted[0]) * (1 - poisson_ratio**2)
+    more = float(pressed.fitted(used, softening).fitted[0] - fit.fitted[0]) * (1 - poisson_ratio**2)
     return replace(result, uncertainty=float(np.hypot(result.uncertainty, more / np.sqrt(3))), finite_strain=more)
 
 
@@ -447,9 +451,7 @@ def estimate(
     displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None = None
 ) -> IndentationModulus:
     """The modulus without checks of the law, as a starting value of fits."""
-    depth, load = loading_branch(displacement, force)
-    fit, used = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
-    return _modulus(depth, load, fit, radius, poisson_ratio, used, thickness)
+    return _Pressed.of(displacement, force, radius, poisson_ratio, thickness).modulus()
 
 
 def require_depth(result: IndentationModulus) -> None:
@@ -493,38 +495,7 @@ def tip_of(
     displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None
 ) -> Tip | None:
     """The apparent tip where it is clearly no sphere; else None."""
-    depth, load = loading_branch(displacement, force)
-    fit, _ = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
-    return _tip(depth, load, fit, thickness)
-
-
-def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip | None:
-    """The tip where another power n of the depth, (f(d − d0))^(n/1.5), which includes the stiffening of a declared
-    layer, fits far better and is outside the range of spheres; else None."""
-    span, noise = float(np.ptp(load)), roughness(load)
-    missed = _beyond(fit.rms, noise)
-    if missed < _MISSES * span:
-        return None
-    at = np.unique(np.linspace(0, len(load) - 1, min(len(load), _THINNED)).round().astype(np.intp))
-    fits = {float(power): _fitted(depth[at], load[at], _to_power(fit.law, float(power))) for power in _POWERS}
-    power = min(fits, key=lambda power: fits[power].rms)
-    best = fits[power].rms
-    scale = max(noise, best, _AS_IDEAL * span)
-    gained = len(at) * (fit.rms**2 - best**2) / (2 * scale**2)  # nats of normal noise
-    if _beyond(best, noise) > _TAKES * missed or gained < _SURE or _SPHERES[0] <= power <= _SPHERES[1]:
-        return None
-    like = "as under a cone (2)"
-    if power < _SPHERES[0]:
-        like = "as under a flat punch (1), or where stage or cantilever give way"
-    elif thickness is None:
-        like += ", or on a thin layer whose thickness is not declared"
-    allowed = (
-        f"is {like}; a sphere has 1.5, and its law misses by {100 * fit.rms / span:.2g} % of the force, "
-        f"{fit.rms / max(noise, 1e-300):.2g} times the noise: no modulus follows; look at the tip, and press a block "
-        "of known modulus"
-    )
-    is_plain = best < max(_AS_NOISE * noise, _AS_IDEAL * span)
-    return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed), is_plain)
+    return _Pressed.of(displacement, force, radius, poisson_ratio, thickness).tip()
 
 
 def _beyond(rms: float, noise: float) -> float:
@@ -532,36 +503,91 @@ def _beyond(rms: float, noise: float) -> float:
     return float(np.sqrt(max(rms**2 - noise**2, 0.0)))
 
 
-def _sphere_fit(
-    depth: Floats,
-    load: Floats,
-    radius: float,
-    poisson_ratio: float,
-    thickness: float | None,
-) -> tuple[_Fit, float | None]:
-    """The fit on the declared layer, or on the half space where that fits clearly better; and its thickness."""
-    half_space = _as_deep(depth, load, radius, None, poisson_ratio)
-    if thickness is None:
-        return half_space, None
-    layer = _as_deep(depth, load, radius, thickness, poisson_ratio)
-    if half_space.rms < _PLAINLY * layer.rms:
-        return half_space, None
-    return layer, thickness
+@dataclass(frozen=True)
+class _Pressed:
+    """The loading branch of a sphere: `depth` [m] and `load` [N] (samples,), its `radius` [m], and the Poisson ratio
+    and the declared `thickness` [m] of the layer, None without one."""
 
+    depth: Floats
+    load: Floats
+    radius: float
+    poisson_ratio: float
+    thickness: float | None
 
-def _as_deep(
-    depth: Floats,
-    load: Floats,
-    radius: float,
-    thickness: float | None,
-    poisson_ratio: float,
-    softening: Softening | None = None,
-) -> _Fit:
-    """The fit with the full sphere instead of the paraboloid where it is pressed deep."""
-    fit = _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening))
-    if depth.max() - fit.contact < PARABOLOID * radius:
-        return fit
-    return _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening, full_sphere=True))
+    @classmethod
+    def of(
+        cls, displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None
+    ) -> "_Pressed":
+        """Of a whole curve; raises InvalidInput as `loading_branch`."""
+        return cls(*loading_branch(displacement, force), radius, poisson_ratio, thickness)
+
+    def fitted(self, thickness: float | None, softening: Softening | None = None) -> _Fit:
+        """The law on a layer, or on the half space, fitted: of the full sphere instead of the paraboloid where it is
+        pressed deep."""
+        fit = _fitted(self.depth, self.load, SphereLaw(self.radius, thickness, self.poisson_ratio, softening))
+        if self.depth.max() - fit.contact < PARABOLOID * self.radius:
+            return fit
+        full = SphereLaw(self.radius, thickness, self.poisson_ratio, softening, full_sphere=True)
+        return _fitted(self.depth, self.load, full)
+
+    @cached_property
+    def by_sphere(self) -> tuple[_Fit, float | None]:
+        """The fit on the declared layer, or on the half space where that fits clearly better; and its thickness."""
+        half_space = self.fitted(None)
+        layer = half_space if self.thickness is None else self.fitted(self.thickness)
+        return (half_space, None) if half_space.rms < _PLAINLY * layer.rms else (layer, self.thickness)
+
+    def modulus(self) -> IndentationModulus:
+        """The modulus by that fit."""
+        fit, thickness = self.by_sphere
+        # d0 is a parameter as well: its column is the slope of the model.
+        step = 1e-4 * float(np.ptp(self.depth))
+        behind, before = (fit.law(self.depth - fit.contact + shift) for shift in (-step, step))
+        jacobian = np.column_stack([fit.design, fit.fitted[0] * (behind - before) / (2 * step)])
+        freedom = max(1, len(self.load) - jacobian.shape[1])
+        variance = float(fit.residual @ fit.residual) / freedom * _correlation_factor(fit.residual)
+        deviation = float(np.sqrt(variance)) * _amplification(jacobian)
+        per_reduced = 1 - self.poisson_ratio**2
+        return IndentationModulus(
+            modulus=float(fit.fitted[0] * per_reduced),
+            uncertainty=float(deviation * per_reduced),
+            contact_point=fit.contact,
+            residual=fit.rms,
+            depth=float(self.depth.max() - fit.contact),
+            radius=self.radius,
+            thickness=thickness,
+            declared_thickness=self.thickness,
+            noise=roughness(self.load),
+        )
+
+    def tip(self) -> Tip | None:
+        """The tip where another power n of the depth, (f(d − d0))^(n/1.5), which includes the stiffening of a declared
+        layer, fits far better and is outside the range of spheres; else None."""
+        fit, span, noise = self.by_sphere[0], float(np.ptp(self.load)), roughness(self.load)
+        missed = _beyond(fit.rms, noise)
+        if missed < _MISSES * span:
+            return None
+        at = np.unique(np.linspace(0, len(self.load) - 1, min(len(self.load), _THINNED)).round().astype(np.intp))
+        depth, load = self.depth[at], self.load[at]
+        fits = {float(power): _fitted(depth, load, _to_power(fit.law, float(power))) for power in _POWERS}
+        power = min(fits, key=lambda power: fits[power].rms)
+        best = fits[power].rms
+        scale = max(noise, best, _AS_IDEAL * span)
+        gained = len(at) * (fit.rms**2 - best**2) / (2 * scale**2)  # nats of normal noise
+        if _beyond(best, noise) > _TAKES * missed or gained < _SURE or _SPHERES[0] <= power <= _SPHERES[1]:
+            return None
+        like = "as under a cone (2)"
+        if power < _SPHERES[0]:
+            like = "as under a flat punch (1), or where stage or cantilever give way"
+        elif self.thickness is None:
+            like += ", or on a thin layer whose thickness is not declared"
+        allowed = (
+            f"is {like}; a sphere has 1.5, and its law misses by {100 * fit.rms / span:.2g} % of the force, "
+            f"{fit.rms / max(noise, 1e-300):.2g} times the noise: no modulus follows; look at the tip, and press a "
+            "block of known modulus"
+        )
+        is_plain = best < max(_AS_NOISE * noise, _AS_IDEAL * span)
+        return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed), is_plain)
 
 
 def _to_power(law: Callable[[Floats], Floats], power: float) -> Callable[[Floats], Floats]:
@@ -573,39 +599,10 @@ def _fitted(depth: Floats, load: Floats, law: Callable[[Floats], Floats]) -> _Fi
     with_offset = int((depth < contact).sum()) >= _AIR
     if not with_offset:
         contact, at_bound = _contact_point(depth, load, law, offset=False)
-    design = _design(depth, contact, law, with_offset)
+    pressed = law(depth - contact)
+    design = np.column_stack([pressed, np.ones_like(pressed)]) if with_offset else pressed[:, None]
     fitted: Floats = np.linalg.lstsq(design, load, rcond=None)[0].astype(np.float64)
     return _Fit(law, contact, design, fitted, load - design @ fitted, at_bound)
-
-
-def _modulus(
-    depth: Floats,
-    load: Floats,
-    fit: _Fit,
-    radius: float,
-    poisson_ratio: float,
-    thickness: float | None,
-    declared: float | None,
-) -> IndentationModulus:
-    # d0 is a parameter as well: its column is the slope of the model.
-    step = 1e-4 * float(np.ptp(depth))
-    slope = fit.fitted[0] * (fit.law(depth - fit.contact - step) - fit.law(depth - fit.contact + step)) / (2 * step)
-    jacobian = np.column_stack([fit.design, slope])
-    freedom = max(1, len(load) - jacobian.shape[1])
-    variance = float(fit.residual @ fit.residual) / freedom * _correlation_factor(fit.residual)
-    deviation = float(np.sqrt(variance)) * _amplification(jacobian)
-    per_reduced = 1 - poisson_ratio**2
-    return IndentationModulus(
-        modulus=float(fit.fitted[0] * per_reduced),
-        uncertainty=float(deviation * per_reduced),
-        contact_point=fit.contact,
-        residual=fit.rms,
-        depth=float(depth.max() - fit.contact),
-        radius=radius,
-        thickness=thickness,
-        declared_thickness=declared,
-        noise=roughness(load),
-    )
 
 
 def _amplification(jacobian: Floats) -> float:
@@ -617,11 +614,6 @@ def _amplification(jacobian: Floats) -> float:
         allowed = "must tell the modulus from the contact point: more samples in contact"
         raise unusable("displacement_mm", f"{np.count_nonzero(jacobian[:, 0])} samples in contact", allowed)
     return float(np.sqrt(np.linalg.inv(normal)[0, 0]) / size[0])
-
-
-def _design(depth: Floats, contact: float, law: Callable[[Floats], Floats], offset: bool) -> Floats:
-    pressed = law(depth - contact)
-    return np.column_stack([pressed, np.ones_like(pressed)]) if offset else pressed[:, None]
 
 
 def _contact_point(depth: Floats, load: Floats, law: Callable[[Floats], Floats], *, offset: bool) -> tuple[float, bool]:
@@ -638,10 +630,8 @@ def _contact_point(depth: Floats, load: Floats, law: Callable[[Floats], Floats],
 
     span = float(np.ptp(depth))
     guesses = np.linspace(depth.min() - (0 if offset else span), depth.max() - 0.02 * span, _CONTACTS)
-    best = int(np.argmin([misfit(float(guess)) for guess in guesses]))
-    around = float(guesses[max(best - 1, 0)]), float(guesses[min(best + 1, len(guesses) - 1)])
-    minimum = minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-9 * span}).x
-    return float(minimum), not offset and best == 0
+    contact_point, best = _least(misfit, guesses, 1e-9 * span)
+    return contact_point, not offset and best == 0
 
 
 def _correlation_factor(residual: Floats) -> float:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from datetime import datetime, timedelta
+from operator import attrgetter
 
 import numpy as np
 from scipy.special import fdtrc
@@ -57,7 +58,7 @@ def _common_rate(used: list[Channel], file: str) -> float | None:
 
 def _cut_to_common(block: Block, used: dict[str, Channel], file: str) -> tuple[Block, list[str]]:
     """The block with the used channels cut, and a warning; unchanged where they start within one sample."""
-    first, last = min(used.values(), key=_starts_s), max(used.values(), key=_starts_s)
+    first, last = (end(used.values(), key=attrgetter("starts_s")) for end in (min, max))
     start_times = f"{first.name!r} starts at {_time(block, first)}, {last.name!r} at {_time(block, last)}"
     if block.sample_rate_hz is None:
         raise FileError(file, "", f"{start_times}, and no sample rate is stated by which to align them")
@@ -80,10 +81,6 @@ def _cut_to_common(block: Block, used: dict[str, Channel], file: str) -> tuple[B
     )
     warning = f"{start_times}: they were aligned, with {count} samples in common"
     return replace(block, channels=channels), [warning]
-
-
-def _starts_s(channel: Channel) -> float:
-    return channel.starts_s
 
 
 def _time(block: Block, channel: Channel) -> str:

@@ -482,29 +482,25 @@ def _require_complete(place: str, signal: SignalMapping) -> None:
 
 def _require_fitting_field(name: str, channel_mapping: ChannelMapping, fields_given: Collection[str]) -> None:
     """Reject conversions on fields that they do not apply to."""
-    stiffness, spring = channel_mapping.stiffness_n_per_mm, channel_mapping.spring_constant_n_per_m
+    given = channel_mapping.stiffness_n_per_mm, channel_mapping.spring_constant_n_per_m
+    stiffness, spring = (value.property if isinstance(value, Property) else value for value in given)
     if channel_mapping.tare_percent is not None and name not in _TARED:
         fields_with_tare = Requirement(
             "is for ", Mention("force_n"), ", ", Mention("charge_pc"), " and ", Mention("displacement_mm")
         )
         raise conflicting(f"channels.{name}.tare_percent", channel_mapping.tare_percent, fields_with_tare)
-    if stiffness is not None and (name != "displacement_mm" or "force_n" not in fields_given):
-        raise conflicting(f"channels.{name}.stiffness_n_per_mm", _shown(stiffness), _is_for("displacement_mm"))
-    if channel_mapping.deflection is not None and name != "displacement_mm":
-        raise conflicting(f"channels.{name}.deflection", channel_mapping.deflection.channel, _is_for("displacement_mm"))
-    if channel_mapping.deflection is not None and stiffness is not None:
+    deflection = None if channel_mapping.deflection is None else channel_mapping.deflection.channel
+    is_stiff = name == "displacement_mm" and "force_n" in fields_given
+    for field_name, value, is_fitting, meant in (
+        ("stiffness_n_per_mm", stiffness, is_stiff, "displacement_mm"),
+        ("deflection", deflection, name == "displacement_mm", "displacement_mm"),
+        ("spring_constant_n_per_m", spring, name == "force_n", "force_n"),
+    ):
+        if value is not None and not is_fitting:
+            raise conflicting(f"channels.{name}.{field_name}", value, Requirement("is for ", Mention(meant)))
+    if deflection is not None and stiffness is not None:
         both = "must not be given with a deflection, which is subtracted already"
-        raise conflicting(f"channels.{name}.stiffness_n_per_mm", _shown(stiffness), both)
-    if spring is not None and name != "force_n":
-        raise conflicting(f"channels.{name}.spring_constant_n_per_m", _shown(spring), _is_for("force_n"))
-
-
-def _shown(value: float | Property) -> float | str:
-    return value.property if isinstance(value, Property) else value
-
-
-def _is_for(name: str) -> Requirement:
-    return Requirement("is for ", Mention(name))
+        raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, both)
 
 
 Stated = Mapping[str, str | float]

@@ -7,13 +7,13 @@ called alike but for their first word (`s01 |H|`, `s01 phase`, `s02 |H|`, …) a
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
 
-from underskin.recordings.channels import Block, Contents
+from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.field_words import (
     OF_CHANNELS,
     OF_SENSORS,
@@ -78,15 +78,6 @@ class Column(Protocol):
         """Whether its values are complex."""
 
 
-@dataclass(frozen=True)
-class Heading:
-    """A `Column`."""
-
-    name: str
-    unit: str
-    is_complex: bool = False
-
-
 def main_blocks(contents: Contents) -> list[Block]:
     """The blocks with the channels of the longest one: beside the data, a file may hold a table of results."""
     longest = max(
@@ -96,19 +87,21 @@ def main_blocks(contents: Contents) -> list[Block]:
     return [block for block in contents.blocks if names == {channel.name for channel in block.channels}]
 
 
+def _columns(blocks: Sequence[Block]) -> list[Channel]:
+    """The channels of the blocks, with the units that their names say; of those of one name the last."""
+    named = {channel.name: channel for block in blocks for channel in block.channels}
+    return [replace(channel, unit=channel.label) for channel in named.values()]
+
+
 def of_contents(contents: Contents) -> dict[str, Any]:
     """The rig description that the contents of a file suggest, as a document; `None` stands for what is missing."""
     blocks = main_blocks(contents)
-    columns = {
-        channel.name: Heading(channel.name, channel.label, np.iscomplexobj(channel.values))
-        for block in blocks
-        for channel in block.channels
-    }
+    columns = _columns(blocks)
     texts = dict.fromkeys(column.name for block in blocks for column in block.texts)
     dated = any(block.recorded_at is not None for block in contents.blocks)
-    document = guessed(list(columns.values()), contents.properties, {}, list(texts), dated=dated)
+    document = guessed(columns, contents.properties, {}, list(texts), dated=dated)
     kind = document["kind"]
-    document = {**document, **_entries(list(columns.values()), document)}
+    document = {**document, **_entries(columns, document)}
     document["recording"] = {
         name: source for name, source in document["recording"].items() if not _is_measured(source, blocks)
     }
@@ -175,11 +168,7 @@ def _places(contents: Contents, sensor: str) -> dict[str, tuple[float, float]]:
 
 def unclear(contents: Contents) -> list[str]:
     """Fields that several columns or several properties of a file may be, each with these, in words."""
-    columns = [
-        Heading(channel.name, channel.label, np.iscomplexobj(channel.values))
-        for block in main_blocks(contents)[:1]
-        for channel in block.channels
-    ]
+    columns = _columns(main_blocks(contents)[:1])
     by_field: dict[str, list[str]] = {}
     if not _entries(columns, guessed(columns, {}, {})):
         for column, field in zip(columns, likely(columns)[1], strict=True):
@@ -315,12 +304,11 @@ def _row_fields(
 def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str, Any]:
     """`recordings` and the common `channels` of a table with the same columns for each sensor; empty of another."""
     common = [column for column in columns if document["channels"].get("frequency_hz") == {"channel": column.name}]
-    by_sensor: dict[str, dict[str, Heading]] = {}
+    by_sensor: dict[str, dict[str, Column]] = {}
     for column in columns:
         parts = _FIRST_WORD.fullmatch((in_brackets(column.name) or (column.name,))[0])
         if parts is not None and column not in common:
-            heading = Heading(column.name, column.unit, column.is_complex)
-            by_sensor.setdefault(parts["first"], {})[parts["rest"]] = heading
+            by_sensor.setdefault(parts["first"], {})[parts["rest"]] = column
     alike = {tuple(of_sensor) for of_sensor in by_sensor.values()}
     if document["kind"] != "frf" or not common or len(by_sensor) < 2 or len(alike) != 1:
         return {}
@@ -394,14 +382,10 @@ def _with_spring(channels: dict[str, Any], columns: Sequence[Column], properties
     if "force_n" in channels or not springs or travel is None:
         return channels
     deflection = {"channel": springs[0]}
-    constant = next((name for name in properties if _is_stiffness(labelled_unit(name))), None)
+    labels = {name: unit(labelled_unit(name)) for name in properties}
+    constant = next((name for name, label in labels.items() if label and label.dimension == "force/length"), None)
     force = {"force_n": {**deflection, "spring_constant_n_per_m": {"property": constant}}} if constant else {}
     return {**channels, "displacement_mm": {"channel": travel, "deflection": deflection}, **force}
-
-
-def _is_stiffness(label: str) -> bool:
-    parsed = unit(label)
-    return parsed is not None and parsed.dimension == "force/length"
 
 
 def missing(document: Mapping[str, Any]) -> list[str]:

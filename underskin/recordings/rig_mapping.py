@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -64,7 +64,7 @@ from underskin.recordings.rig_description import (
     spring_constant,
     text_value,
 )
-from underskin.recordings.tare import Rise, rise_of
+from underskin.recordings.tare import rise_of
 from underskin.recordings.validation import LONGEST_NAME, shown
 from underskin.units import LAB, Floats, readable_unit
 
@@ -94,6 +94,8 @@ _LEAST_SAMPLES, _STILL = 16, 1e-9  # samples of a measured force; share of its l
 class MappedBlock:
     """The fields of one recording from one block; `taken`: the source of each field in words; `warnings` on them.
     `stated`: the properties of the file."""
+
+    is_curve: ClassVar[bool] = True  # whose tared samples should be in the air
 
     def __init__(self, rig: RigDescription, block: Block, stated: Stated, file: str) -> None:
         self.rig = rig
@@ -136,14 +138,11 @@ class MappedBlock:
         self.taken["sample_rate_hz"] = f"property {stated[0]!r}: {stated[1]:.6g} Hz"
         return stated[1]
 
-    def _is_series(self, columns: Mapping[str, Floats]) -> bool:  # noqa: ARG002
-        """Whether the samples are those of a time series that must not have gaps."""
-        return False
-
     def _complete(self, columns: Mapping[str, Floats]) -> dict[str, Floats]:
-        """The columns without lines, or parts of a time series, that hold no number."""
+        """The columns without lines, or parts of a time series, which must not have gaps, that hold no number."""
+        may_have_gaps = self.is_curve or "frequency_hz" in columns
         try:
-            complete, note = (longest_complete if self._is_series(columns) else complete_lines)(columns)
+            complete, note = (complete_lines if may_have_gaps else longest_complete)(columns)
         except ValueError as error:
             raise self._error("", str(error)) from None
         self.warnings += [note] if note else []
@@ -289,7 +288,7 @@ class MappedBlock:
         self.taken[field] += f", less {readable(field, zero)}, its mean over {part}"
         words = field.rpartition("_")[0]
         self.warnings.append(f"the {words} is 0 on average over {part} of each curve: it was tared so")
-        rise = self._rise_of(column, len(tared)) if field == "force_n" else None
+        rise = rise_of(column, len(tared)) if field == "force_n" and self.is_curve else None
         if rise is not None:
             shown_in, count = readable_unit(field, abs(rise.height))
             self.warnings.append(
@@ -413,10 +412,6 @@ class MappedBlock:
                 hint += f"; if it is {name!r} that is reversed, turn it in the formula of {of} too"
         return hint
 
-    def _rise_of(self, column: Floats, count: int) -> Rise | None:
-        """As `rise_of`, where the tared samples should be in the air."""
-        return rise_of(column, count)
-
     def _error(self, place: str, reason: str | Requirement) -> FileError:
         return FileError(self.file, place, reason)
 
@@ -439,11 +434,7 @@ class IndentationBlock(MappedBlock):
 class FrfBlock(MappedBlock):
     """An FRF, or the time series of one, which is tared under the preload."""
 
-    def _is_series(self, columns: Mapping[str, Floats]) -> bool:
-        return "frequency_hz" not in columns
-
-    def _rise_of(self, column: Floats, count: int) -> Rise | None:  # noqa: ARG002
-        return None
+    is_curve = False
 
     def _of_kind(self, columns: dict[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""

@@ -15,7 +15,7 @@ Force and charge look exchanged where the charge has the declared mean and oscil
 not.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -149,8 +149,13 @@ def _total(parts: Sequence[_Weighted]) -> float:
 
 def _in_phase(parts: Sequence[_Weighted], delays: Floats) -> Floats:
     """The share of the power that is in phase or in antiphase at each delay [s] of the charge."""
-    powers = (_power(stack.frequency, factors, delays) for stack, factors in parts)
-    return sum(powers, np.zeros(len(delays))) / _total(parts)
+    power = np.zeros(len(delays))
+    for first in range(0, len(delays), _CHUNK):
+        chunk = delays[first : first + _CHUNK]
+        for stack, factors in parts:
+            turned = factors @ np.exp(2j * np.pi * np.outer(stack.frequency, chunk))
+            power[first : first + _CHUNK] += (turned.real**2).sum(axis=0)
+    return power / _total(parts)
 
 
 def _best_delay(parts: Sequence[_Weighted]) -> tuple[float, float]:
@@ -162,7 +167,8 @@ def _best_delay(parts: Sequence[_Weighted]) -> tuple[float, float]:
     delays: Floats = step * np.arange(-(count // 2), count // 2 + 1).astype(np.float64)
     for _ in range(3):
         power = _in_phase(parts, delays)
-        best = delays[_nearest_peak(delays, power)]
+        peaks = delays[power >= power.max() * (1 - 1e-9)]  # few lines cannot resolve them
+        best = peaks[np.argmin(np.abs(peaks))]
         delays = np.asarray(best + np.arange(-_STEPS, _STEPS + 1) * (step / _STEPS), dtype=np.float64)
         step /= _STEPS
     return float(best), float(power.max())
@@ -183,27 +189,6 @@ def advanced(values: Complexes, frequency: Floats, delay: float) -> Complexes:
 def _phase_factors(values: Complexes) -> Complexes:
     valid = np.isfinite(values) & (values != 0)
     return np.where(valid, np.exp(1j * np.angle(np.where(valid, values, 1.0))), 0.0)
-
-
-def _power(frequency: Floats, factors: Complexes, delays: Floats) -> Floats:
-    """Σ over recordings of (Re Σ over lines of factors · e^(2πifτ))² at each delay."""
-    return np.concatenate(
-        [
-            ((factors @ np.exp(2j * np.pi * np.outer(frequency, chunk))).real ** 2).sum(axis=0)
-            for chunk in _chunks(delays)
-        ]
-    )
-
-
-def _chunks(delays: Floats) -> Iterator[Floats]:
-    for first in range(0, len(delays), _CHUNK):
-        yield delays[first : first + _CHUNK]
-
-
-def _nearest_peak(delays: Floats, power: Floats) -> int:
-    """The index of the peak nearest to 0 among those nearly as high as the highest: few lines cannot resolve them."""
-    peaks = np.flatnonzero(power >= power.max() * (1 - 1e-9))
-    return int(peaks[np.argmin(np.abs(delays[peaks]))])
 
 
 _BLOCKS = 15  # half-overlapping blocks of a broadband record by default: a resolution of 8 / its length
@@ -265,40 +250,15 @@ def broadband(
     window: str = "hann",
     estimator: Estimator = "H1",
 ) -> Frf:
-    """The FRF of a broadband force: Welch's average over blocks.
+    """The FRF of a broadband force: Welch's average over blocks, at the multiples of sample_rate/block_samples.
 
-    The straight line through each block (preload, DC and drift) is removed. The lines at 0 Hz and at half the sample
-    rate, which carry no phase, are left out, as are blocks with a defect. A lag between the signals, which would lower
-    H1, is removed first and restored in the phase, where that raises γ².
+    Parameters and errors are those of `estimate`; a block has 8 samples to all of the series, without `block_samples`
+    1/8 of it; the next one has the share `overlap`, less than 1, in common with it. The straight line through each
+    block (preload, DC and drift) is removed, and the `window` applied, a name of `scipy.signal.get_window`. The lines
+    at 0 Hz and at half the sample rate, which carry no phase, are left out, as are blocks with a defect. A lag between
+    the signals, which would lower H1, is removed first and restored in the phase, where that raises γ².
 
-    Parameters
-    ----------
-    force, charge : (samples,) arrays
-        Time series [N], [C], of one length.
-    sample_rate : float
-        [Hz].
-    block_samples : int, optional
-        Length of a block, 8 to the length of the series; without it 1/8 of that.
-    overlap : float
-        Share of a block that the next one has in common with it, 0 or greater and less than 1.
-    window : str
-        Taper of a block, a name of `scipy.signal.get_window`.
-    estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see `estimators`.
-
-    Returns
-    -------
-    Frf
-        At the multiples of sample_rate/block_samples.
-
-    Raises
-    ------
-    InvalidInput
-        No undamaged block is left, or the series do not make a block.
-
-    Source
-    ------
-    Welch 1967; Bendat and Piersol, Random Data, chapters 5 and 9.
+    Source: Welch 1967; Bendat and Piersol, Random Data, chapters 5 and 9.
     """
     _check(force, charge, sample_rate)
     size = block_samples or max(8, 2 * len(force) // (_BLOCKS + 1))
@@ -306,9 +266,7 @@ def broadband(
         raise out_of_range("block_samples", size, f"must be 8 to {len(force)}, the length of the signals")
     if not 0 <= overlap < 1:
         raise out_of_range("overlap", overlap, "must be 0 or greater and less than 1")
-    step = max(1, round(size * (1 - overlap)))
-    taper = _taper(window, size)
-    blocks = Blocks(taper, step, slice(1, (size + 1) // 2), without_line)
+    blocks = Blocks(_taper(window, size), max(1, round(size * (1 - overlap))), slice(1, (size + 1) // 2), without_line)
     frf = replace(averaged(force, charge, sample_rate, blocks, estimator), independent=False)
     lag = lag_between(force, charge, size)
     if not lag:
@@ -341,65 +299,28 @@ def _as_recorded(aligned: Frf, lag: int, sample_rate: float) -> Frf:
 
 
 def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
-    """The FRF of a periodic force: the average over all pairs of consecutive periods.
+    """The FRF of a periodic force: the average over all pairs of consecutive periods T.
 
-    With Hann's window over two periods T the lines at the multiples of 1/T are free of leakage.
+    With Hann's window over two of them the lines at the multiples of 1/T are free of leakage; those below half the
+    sample rate are given. Parameters are those of `estimate`; raises InvalidInput, also where the force has no period,
+    or no two undamaged periods in a row are left.
 
-    Parameters
-    ----------
-    force, charge : (samples,) arrays
-        Time series [N], [C], of one length.
-    sample_rate : float
-        [Hz].
-    estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see `estimators`.
-
-    Returns
-    -------
-    Frf
-        At the multiples of 1/T below half the sample rate.
-
-    Raises
-    ------
-    InvalidInput
-        The force has no period, or no two undamaged periods in a row are left.
-
-    Source
-    ------
-    Pintelon and Schoukens, System Identification, 2012, chapter 2.
+    Source: Pintelon and Schoukens, System Identification, 2012, chapter 2.
     """
     _check(force, charge, sample_rate)
     period = period_of(force)
     if not period:
         raise unusable("force_n", f"{len(force)} samples", "must repeat itself at least four times")
-    taper = _taper("hann", 2 * period)
-    blocks = Blocks(taper, period, slice(2, period, 2), without_drift)
+    blocks = Blocks(_taper("hann", 2 * period), period, slice(2, period, 2), without_drift)
     return averaged(force, charge, sample_rate, blocks, estimator)
 
 
 def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:
     """The FRF of a stepped-sine force: synchronous demodulation of each tone that the force dwells on.
 
-    Least squares on sine, cosine, DC and drift; a few whole cycles are one block of the average.
-
-    Parameters
-    ----------
-    force, charge : (samples,) arrays
-        Time series [N], [C], of one length.
-    sample_rate : float
-        [Hz].
-    estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see `estimators`.
-
-    Returns
-    -------
-    Frf
-        One line for each tone, in order of frequency.
-
-    Raises
-    ------
-    InvalidInput
-        The force dwells on no tone, or no cycle is undamaged.
+    Least squares on sine, cosine, DC and drift; a few whole cycles are one block of the average. There is one line for
+    each tone, in order of frequency. Parameters are those of `estimate`; raises InvalidInput, also where the force
+    dwells on no tone, or no cycle is undamaged.
     """
     _check(force, charge, sample_rate)
     steps = find_steps(force, sample_rate)

@@ -483,6 +483,12 @@ class RollOff:
     filters: "Filters"
     share: float
 
+    @property
+    def arguments(self) -> dict[str, float]:
+        """The corners and the loss as findings state them."""
+        corners = {"high_pass_hz": self.filters.high_hz, "low_pass_hz": self.filters.low_hz}
+        return {**corners, "percent": 100 * self.share}
+
 
 def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff | None:
     """The filters that attenuate the band; None where it reaches their plateau. `level` (recordings,): the average over
@@ -491,8 +497,8 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
     inside = (frequency >= zone.low_hz) & (frequency <= zone.high_hz)
     lifted = np.flatnonzero(magnitude > _LIFTED * np.median(magnitude[inside])) if inside.any() else np.zeros(0, int)
     lifted = lifted[frequency[lifted] > zone.high_hz]
-    if len(lifted) and not _falls_after(magnitude, int(lifted[0])):
-        lifted = lifted[:0]  # a high-pass that goes on rising
+    if len(lifted) and magnitude[-1] >= 0.8 * magnitude[lifted[0] :].max():
+        lifted = lifted[:0]  # no peak: a high-pass that goes on rising
     end = int(lifted[0]) if len(lifted) else len(frequency)
     if end < _FEWEST_BINS:
         return None
@@ -555,11 +561,6 @@ def _magnitude(stacks: Sequence[Stack], count: int) -> Floats:
     for stack in stacks:
         level[stack.rows] = _medians(np.abs(stack.values), stack.used)[:, 0]
     return level
-
-
-def _falls_after(magnitude: Floats, index: int) -> bool:
-    """Whether the magnitude has a peak, not a plateau, from `index` on."""
-    return bool(magnitude[-1] < 0.8 * magnitude[index:].max())
 
 
 @dataclass(frozen=True)
@@ -629,9 +630,7 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
     magnitude over their level, and its relative noise."""
     lines = [stack.frequency[stack.used.any(axis=0)] for stack in stacks]
     edges = edges_over(np.unique(np.concatenate(lines)))
-    ratios: list[list[float]] = [[] for _ in edges[1:]]
-    bin_scatters: list[list[tuple[float, int]]] = [[] for _ in edges[1:]]
-    lines_of_bins: list[list[float]] = [[] for _ in edges[1:]]
+    cells: list[list[tuple[float, ...]]] = [[] for _ in edges[1:]]  # of recordings: middle, magnitude, scatter, lines
     for stack in stacks:
         bins = bin_of(stack.frequency, edges)
         for row, number in enumerate(stack.rows.tolist()):
@@ -640,24 +639,17 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
             size = np.abs(stack.values[row]) / abs(level[number])
             for bin_index in np.unique(bins[stack.used[row]]).tolist():
                 chosen = stack.used[row] & (bins == bin_index)
-                of_bin = size[chosen]
-                ratios[bin_index].append(median(of_bin.tolist()))  # of a few: NumPy's takes thirty times as long
-                lines_of_bins[bin_index].append(median(stack.frequency[chosen].tolist()))
-                bin_scatters[bin_index].append((float(np.std(of_bin)), len(of_bin)))
-    filled_bins = [bin_index for bin_index, of_bin in enumerate(ratios) if of_bin and np.median(of_bin) > 0]
-    middle = np.array([float(np.median(lines_of_bins[bin_index])) for bin_index in filled_bins])
-    magnitude = np.array([float(np.median(ratios[bin_index])) for bin_index in filled_bins])
-    several = [deviation for of_bin in bin_scatters for deviation, count in of_bin if count >= _SEVERAL]
+                # Of a few: NumPy's median takes thirty times as long
+                middle_hz, typical = (median(column[chosen].tolist()) for column in (stack.frequency, size))
+                cells[bin_index].append((middle_hz, typical, float(np.std(size[chosen])), int(chosen.sum())))
+    several = [deviation for of_bin in cells for *_, deviation, count in of_bin if count >= _SEVERAL]
     usual = float(np.median(several)) if several else _USUAL_NOISE
-    noise = np.array([_noise_of(bin_scatters[bin_index], usual) for bin_index in filled_bins])
+    filled = [part for of_bin in cells if of_bin and np.median((part := np.array(of_bin).T)[1]) > 0]
+    middle, magnitude = np.array([np.median(part[:2], axis=1) for part in filled]).reshape(-1, 2).T
+    # Of a median over recordings; with few lines their deviation is at least the usual one
+    errors = [np.maximum(part[2], np.where(part[3] < _SEVERAL, usual, 0.0)) / np.sqrt(part[3]) for part in filled]
+    noise = np.array([_OF_A_MEDIAN * float(np.median(error)) / len(error) ** 0.5 for error in errors])
     return middle, magnitude, np.maximum(noise / magnitude, _LEAST_NOISE)
-
-
-def _noise_of(bin_scatters: Sequence[tuple[float, int]], usual: float) -> float:
-    """The noise of a median over recordings from the standard deviations and numbers of their lines in a bin; with few
-    lines at least the `usual` deviation."""
-    errors = [max(deviation, usual if count < _SEVERAL else 0.0) / count**0.5 for deviation, count in bin_scatters]
-    return 1.25 * float(np.median(errors)) / len(errors) ** 0.5
 
 
 _HALVES_BEYOND_NOISE = 3.0

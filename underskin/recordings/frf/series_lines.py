@@ -34,13 +34,14 @@ class Estimated:
 
 def as_lines(recordings: Sequence[FrfRecording]) -> Estimated:
     """The recordings with their usable lines."""
-    measured, findings = _measured(recordings)
-    chosen = dict(zip(measured, usable_lines(list(measured.values())), strict=True))
+    chosen, findings = chosen_lines(recordings, Reason.SERIES_NOT_USABLE)
+    findings += [finding for name, lines in chosen.items() for finding in left_out_of(name, lines.frf.defects)]
     usable, series = list[FrfRecording](), dict[str, Usable]()
     for recording in [recording for recording in recordings if recording.id in chosen]:
         lines = chosen[recording.id]
         if recording.sample_rate_hz is not None and not len(lines.choice.lines):
-            findings.append(_unusable(recording, lines))
+            none_follows = Finding(Reason.INCOHERENT, recording.id, "charge_pc")
+            findings.append(of_spoilt(recording.id, lines) or none_follows)
             continue
         usable.append(_with_lines(recording, lines))
         if recording.sample_rate_hz is not None:
@@ -74,27 +75,25 @@ def as_given(recordings: Sequence[FrfRecording], findings: Sequence[Finding]) ->
     ]
 
 
-def _measured(recordings: Sequence[FrfRecording]) -> tuple[dict[str, Frf], list[Finding]]:
-    """The FRFs of the recordings that have one, by their ids, and findings on their time series."""
+def chosen_lines(recordings: Sequence[FrfRecording], refused: Reason) -> tuple[dict[str, Usable], list[Finding]]:
+    """The usable lines of the recordings that have an FRF, by their ids, and findings, for this reason, on the
+    others."""
     measured, findings = dict[str, Frf](), list[Finding]()
     for recording in recordings:
         try:
-            frf = lines_of(recording)
+            measured[recording.id] = lines_of(recording)
         except InvalidInput as refusal:
-            findings.append(Finding(Reason.SERIES_NOT_USABLE, recording.id, refusal.field, {"refusal": refusal}))
-            continue
-        measured[recording.id] = frf
-        findings += left_out_of(recording.id, frf.defects)
-    return measured, findings
+            findings.append(Finding(refused, recording.id, refusal.field, {"refusal": refusal}))
+    return dict(zip(measured, usable_lines(list(measured.values())), strict=True)), findings
 
 
-def _unusable(recording: FrfRecording, lines: Usable) -> Finding:
-    """Why no line of a time series can be used."""
+def of_spoilt(name: str, lines: Usable) -> Finding | None:
+    """Why no line of a recording can be used: an overload, or mains; None otherwise."""
     if lines.overload is not None:
-        return Finding(Reason.DEFECT, recording.id, lines.overload.channel, asdict(lines.overload))
+        return Finding(Reason.DEFECT, name, lines.overload.channel, asdict(lines.overload))
     if lines.all_spoilt_by_hz is None:
-        return Finding(Reason.INCOHERENT, recording.id, "charge_pc")
-    return Finding(Reason.MAINS_SPOIL_ALL, recording.id, "charge_pc", {"mains_hz": lines.all_spoilt_by_hz})
+        return None
+    return Finding(Reason.MAINS_SPOIL_ALL, name, "charge_pc", {"mains_hz": lines.all_spoilt_by_hz})
 
 
 def _with_lines(recording: FrfRecording, lines: Usable) -> FrfRecording:

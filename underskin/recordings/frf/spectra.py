@@ -268,7 +268,8 @@ def _clipped_in_noise(signal: Floats, other: Floats) -> Mask:
     if not ends.any() or away.sum() < _FEWEST_PILED_UP:
         return mask
     for _ in range(1 if period_of(signal) or period_of(other) else _PASSES):
-        response = _linear_response(other - other.mean(), filled - filled.mean())
+        cause = other - other.mean()
+        response = _LinearResponses(cause, max(len(cause) // _PARTS, 2)).of(filled - filled.mean())
         expected = _scaled(response, level, away)
         usual = _rms((expected - level)[away] * level[away]) / max(_rms(level[away]), _TINY)
         for sign, end in piled.items():
@@ -291,11 +292,6 @@ def _scaled(response: Floats, level: Floats, away: Mask) -> Floats:
 
 def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _linear_response(cause: Floats, effect: Floats) -> Floats:
-    """The part of an effect (samples,) that follows its cause linearly, by their spectra averaged over blocks."""
-    return _LinearResponses(cause, max(len(cause) // _PARTS, 2)).of(effect)
 
 
 class _LinearResponses:

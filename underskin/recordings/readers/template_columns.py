@@ -99,7 +99,7 @@ class NoField(ValueError):
 
 
 @dataclass
-class _Nameless:
+class OtherColumn:
     """Statistics of the non-empty cells of a column that names no field."""
 
     count: int = 0
@@ -107,6 +107,14 @@ class _Nameless:
     has_numbers: bool = False
     largest: float = 0.0  # magnitude of a number
     counts_from: float | None = None  # the first number, as long as each is one more than that above it
+
+    @classmethod
+    def of(cls, cells: Iterable[str], decimal: str) -> "OtherColumn":
+        """Of all cells of a column."""
+        column = cls()
+        for cell in filter(None, cells):
+            column.see(cell, decimal)
+        return column
 
     def see(self, cell: str, decimal: str) -> None:
         """Add the next cell."""
@@ -120,10 +128,11 @@ class _Nameless:
             self.largest = max(self.largest, abs(number))
         self.count += 1
 
-    @property
-    def is_index(self) -> bool:
-        """Whether it counts the rows, from 0 or 1."""
-        return self.counts_from in (0, 1)
+    def only_counts(self, index: int, heading: str) -> bool:
+        """Whether it is the column at an index without a heading that is empty or counts the rows, from 0 or 1, as
+        spreadsheets write it."""
+        is_first = index == 0 and self.counts_from in (0, 1)
+        return heading.strip().lower() in NO_NAME and (not self.count or is_first)
 
 
 def columns(
@@ -139,7 +148,7 @@ def columns(
     if not any(meaning is not None and meaning[0] == "recorded_at" for meaning in meanings):
         meanings = _dated(headings, meanings)
     present = {meaning[0] for meaning in meanings if meaning is not None}
-    others = {index: _Nameless() for index, meaning in enumerate(meanings) if meaning is None}
+    others = {index: OtherColumn() for index, meaning in enumerate(meanings) if meaning is None}
     for row in rows if others else ():
         for index, column in others.items():
             if index < len(row) and row[index]:
@@ -219,14 +228,14 @@ def in_small_letters(name: str) -> str:
 
 
 def _without(
-    index: int, heading: str, column: _Nameless, field_names: Collection[str], present: Collection[str]
+    index: int, heading: str, column: OtherColumn, field_names: Collection[str], present: Collection[str]
 ) -> list[str]:
     """A message that a column without a field is left out, if it matters; raises NoField where data would be lost.
     `present` are the fields of the other columns."""
-    if heading.strip().lower() in NO_NAME:
-        if column.count and not (index == 0 and column.is_index):
-            raise NoField(index, f"has no heading, but cells such as {column.example!r}")
+    if column.only_counts(index, heading):
         return []
+    if heading.strip().lower() in NO_NAME:
+        raise NoField(index, f"has no heading, but cells such as {column.example!r}")
     reason = f"{heading!r} is no field, or its unit is not of the field"
     words = heading.lower().replace("_", " ")
     if "force" in words and _NO_AMPLITUDE.search(words):

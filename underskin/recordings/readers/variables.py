@@ -41,7 +41,7 @@ class _Found:
     signals: dict[tuple[float, float, int, str], list[tuple[str, Channel]]] = field(default_factory=dict)
 
 
-def contents(variables: Mapping[str, Any], file: str, warnings: tuple[str, ...] = ()) -> Contents:
+def contents(variables: Mapping[str, Any], file: str) -> Contents:
     """The channels of nested mappings of names to arrays, numbers, texts and `Labelled`; raises FileError where
     structures are nested too deep."""
     found = _Found()
@@ -49,8 +49,8 @@ def contents(variables: Mapping[str, Any], file: str, warnings: tuple[str, ...] 
     signals = [_signals(axis, held, len(found.signals) > 1) for axis, held in found.signals.items()]
     several = f" and {len(found.left_out) - _MOST_NAMED} more" if len(found.left_out) > _MOST_NAMED else ""
     named = ", ".join(map(repr, found.left_out[:_MOST_NAMED]))
-    dropped = [f"{named}{several}: no numbers of one or two axes, left out"] if named else []
-    return Contents((*found.blocks, *signals), found.properties, (*warnings, *dropped))
+    warnings = (f"{named}{several}: no numbers of one or two axes, left out",) if named else ()
+    return Contents((*found.blocks, *signals), found.properties, warnings)
 
 
 def _walk(structure: Mapping[str, Any], path: str, depth: int, found: _Found, file: str) -> None:
