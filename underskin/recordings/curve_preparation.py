@@ -445,7 +445,8 @@ def prepared(campaign: Campaign) -> PreparedCurves:
             curve if oriented.may_be_pulled else with_turned(curve, oriented.negative), oriented
         )
         findings.extend((*of_damage, *of_saturation, *of_order))
-        for step in (_without_steps, _until_force_step, _without_periodic_error) if curve.has_sphere else ():
+        of_sphere = (_without_steps, _until_force_step, _without_periodic_error)
+        for step in of_sphere if curve.has_sphere else (_until_force_step,):
             curve, curve_findings = _corrected(curve, step)
             findings.extend(curve_findings)
         return curve
