@@ -197,8 +197,8 @@ class Search:
         return unsupported
 
     def _edge_gain(self, explanation: Explanation) -> float:
-        one, nothing = (log_prior(size, self.supported) for size in (1, 0))
-        return edge_gain(explanation, one - nothing)
+        supported = max(self.supported, 1)  # no set has an edge where nothing is supported
+        return edge_gain(explanation, log_prior(1, supported) - log_prior(0, supported))
 
     def _standing(self, fits: Sequence[Explanation]) -> list[tuple[Explanation, float, float]]:
         """The sets that show, with the logarithms of prior times evidence, and of the sum of this over the sets that it
