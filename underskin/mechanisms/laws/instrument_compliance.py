@@ -17,6 +17,7 @@ _REASON = (
 )
 _OF_RADIUS, _USUAL_RADIUS_MM = 30.0, 5.0  # N/mm for each mm
 _OF_FRAMES, _SD_OF_FRAMES = 2000.0, 1.0  # N/mm
+_SOFTEST_FRAME = 10.0  # N/mm, of a cell of 1 N that gives 0.1 mm
 _SD = 3.0
 
 
@@ -58,13 +59,12 @@ class InstrumentCompliance(Mechanism):
             for recording in conditions.recordings
             if isinstance(recording, IndentationConditions)
         ]
+        (stiffness,) = self.parameters_stated
         if kind == "compression":
-            usual = Normal(math.log(_OF_FRAMES), _SD_OF_FRAMES)
-        elif radii:
-            usual = Normal(math.log(_OF_RADIUS * float(np.median(radii))), _SD)
-        else:
-            return self.parameters_stated
-        return tuple(replace(parameter, prior=usual) for parameter in self.parameters_stated)
+            return (replace(stiffness, prior=Normal(math.log(_OF_FRAMES), _SD_OF_FRAMES), low=_SOFTEST_FRAME),)
+        if radii:
+            return (replace(stiffness, prior=Normal(math.log(_OF_RADIUS * float(np.median(radii))), _SD)),)
+        return self.parameters_stated
 
     def act(self, state: Curve, values: Values) -> None:
         """Let the stage give."""
