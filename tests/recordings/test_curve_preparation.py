@@ -169,6 +169,18 @@ def test_a_held_reading_of_the_force_is_no_leap() -> None:
     assert "force_steps" not in {finding.code for finding in implausible(campaign(depth, force))}
 
 
+@pytest.mark.parametrize(("samples", "digit_n"), [(1000, 0.01), (3000, 0.001)])
+def test_the_last_digit_of_a_force_without_noise_is_no_leap(samples: int, digit_n: float) -> None:
+    """Of a smooth force that is rounded, the change differs by one digit now and then."""
+    travel = np.linspace(0.0, 2.0, samples)
+    stretch = 1 + (travel / 10 if digit_n < 0.01 else -travel / 10)
+    force = np.round(np.pi / 4 * 10**2 * (stretch**-2 - stretch) / 3 / digit_n) * digit_n
+    sample = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
+    sample |= {"displacement_mm": (-travel if digit_n < 0.01 else travel).tolist(), "force_n": force.tolist()}
+    read, _ = from_dict({"schema": "campaign/1", "name": "b", "skin": {"poisson_ratio": 0.5}, "recordings": [sample]})
+    assert not implausible(read)
+
+
 @pytest.mark.parametrize(("of_travel", "of_force"), [(0.0, 1e-3), (1e-5, 0.0), (0.0, 0.0)])
 def test_a_step_between_two_holds(of_travel: float, of_force: float) -> None:
     """The reading jumps while the sphere rests: travel, force or both are constant before and behind the step."""

@@ -99,7 +99,8 @@ def force_step(travel: Floats, force: Floats) -> int | None:
     changed, moved = np.diff(force, prepend=force[0]), np.abs(np.diff(travel, prepend=travel[0]))
     away = force - force[0]
     pressed = away * np.sign(away[np.abs(away).argmax()])
-    noise = roughness(force)
+    digit = float(np.diff(np.unique(force)).min(initial=np.inf))  # of a smooth curve, steps differ by one
+    noise = max(roughness(force), digit)
     for sample in np.flatnonzero(np.abs(changed) > _SUDDEN * noise).tolist():
         first, end = sample - _AROUND, sample + _AROUND + 1
         if first < 1 or end > len(force) or pressed[sample - 1 : sample + 1].min() < _SUDDEN * noise:

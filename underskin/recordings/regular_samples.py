@@ -320,15 +320,19 @@ def _spread_of_readings(columns: Columns, index: Indices, counts: Indices) -> st
     """
     if not {"frf_re_pc_per_n", "frf_im_pc_per_n"} <= columns.keys():
         return ""
+    response = columns["frf_re_pc_per_n"] + 1j * columns["frf_im_pc_per_n"]
+    several = (counts > 1) & (np.bincount(index, ~np.isfinite(response)) == 0)
+    if not several.any():
+        return ""
     order = np.argsort(index, kind="stable")
-    order = order[(counts > 1)[index[order]]]
-    line, turn = index[order], np.concatenate([np.arange(count) for count in counts[counts > 1]])
-    values = columns["frf_re_pc_per_n"][order] + 1j * columns["frf_im_pc_per_n"][order]
+    order = order[several[index[order]]]
+    line, turn = index[order], np.concatenate([np.arange(count) for count in counts[several]])
+    values = response[order]
     size = np.sqrt(np.bincount(line, np.abs(values) ** 2, len(counts)) / counts)[line]
     off = (values - _mean_of(values, line)[line]) / np.where(size > 0, size, 1.0)
     alike = _mean_of(off, turn)
     explained, rest = (float((np.abs(part) ** 2).sum()) for part in (alike[turn], off - alike[turn]))
-    free, freedom = int((counts - 1).sum()), len(alike) - 1
+    free, freedom = int((counts[several] - 1).sum()), len(alike) - 1
     scatter = math.sqrt((explained + rest) / free)
     if scatter < _ROUNDING:
         return ", all equal"
