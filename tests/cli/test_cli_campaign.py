@@ -229,10 +229,11 @@ def test_wrong_usage_is_one_line(arguments: list[str], says: str) -> None:
     assert says in refused(*arguments)
 
 
-def test_modulus_of_a_block_says_what_it_takes_of_the_machine(tmp_path: Path) -> None:
+@pytest.mark.parametrize("sign", [1, -1])
+def test_modulus_of_a_block_says_what_it_takes_of_the_machine(tmp_path: Path, sign: int) -> None:
     """A block of k = E A/h on a frame of stiffness K reads low by k/K: it says from which K on that exceeds its ±.
 
-    Platens that hold the ends of a block with S = D/4H raise it by 2 S².
+    Platens that hold the ends of a block with S = D/4H raise it by 2 S². A machine may count compression negative.
     """
     force = np.linspace(0, 30, 120)
     block = CompressionRecording(
@@ -240,7 +241,7 @@ def test_modulus_of_a_block_says_what_it_takes_of_the_machine(tmp_path: Path) ->
         sample_height_mm=5.0,
         sample_diameter_mm=20.0,
         displacement_mm=force / 400 + force / 200,
-        force_n=force,
+        force_n=sign * force,
     )
     path = tmp_path / "frame.json"
     path.write_bytes(json_file.write(Campaign("frame", SkinDescription(poisson_ratio=0.5), (block,))))

@@ -127,8 +127,8 @@ class InvertedFile:
         results = {modulus.recording: modulus.result for modulus in self.moduli}
         for block in self.reading.campaign.of(CompressionRecording):
             result, share = results[block.id], 0.125 * (block.sample_diameter_mm / block.sample_height_mm) ** 2
-            pressed = block.force_n.max() > -block.force_n.min()
-            if isinstance(result, CompressionModulus) and pressed and share > result.uncertainty / result.modulus:
+            is_pressed = isinstance(result, CompressionModulus) and result.is_pressed
+            if is_pressed and share > result.uncertainty / result.modulus:
                 raised.append(100 * share)
         if not raised:
             return ""
