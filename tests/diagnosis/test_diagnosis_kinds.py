@@ -181,6 +181,19 @@ def test_indentations_block_data_set(table: SigmaTable) -> None:
     assert f"{modulus['value']:.3g} MPa" in alone["statement"]
 
 
+def test_the_stage_of_spheres_is_not_the_frame_of_blocks(table: SigmaTable) -> None:
+    """A soft stage under the spheres says nothing of what presses the block: both tell one E all the same."""
+    soft: Effects = {"instrument_compliance": {"stiffness_n_per_mm": 60.0}}
+    both = [*curves("indentation", SPHERE, 9.0, effects=soft), *curves("compression", BLOCK, 9.0)]
+    document: dict[str, Any] = {"schema": "campaign/1", "name": "curves", "skin": lines()["skin"], "recordings": []}
+    document["skin"]["youngs_modulus_mpa"] = None
+    found = report(document, both, table, *beside("instrument_compliance", "strain_stiffening"))
+    assert (found["contradictions"], named(found)) == ([], ["instrument_compliance"])
+    for kind in ("indentation", "compression"):
+        told = modulus_of(found, kind)
+        assert told["low"] < 9.0 < told["high"]
+
+
 RELAXING: list[tuple[float, float, list[float], dict[str, Any], float]] = [
     (0.45, 60.0, [5.0, 60.0, 400.0], {"speeds_mm_per_s": [0.25], "retract": True, "force_noise_n": 1e-3}, 0.01),
     (0.22, 6.0, [30.0, 60.0], {"hold_s": 4.0, "repeats": 2}, 0.04),

@@ -392,15 +392,18 @@ class CurveLikelihood:
         if not fits:
             return 0.0, np.inf
         fit = max(fits, key=lambda fit: ({*fit.names} == {*names}, fit.log_evidence))
-        index = [stated.name for stated in fit.model.parameters].index(parameter)
+        span = parameter_slices(fit.names, fit.best.hypothesis.lines)[mechanism]
+        index = span.start + [stated.name for stated in fit.model.parameters[span]].index(parameter)
         row = fit.best.hypothesis.mean_indices.index(index)
         return float(fit.point.fit[index]), float(fit.best.covariance[row, row])
 
 
 def _acts_on(name: str, lines: Lines) -> bool:
+    """Whether the recordings can share a mechanism with another kind's: one of a rig is of the rig of its kind."""
     mechanism = lines.mechanisms.named.get(name)
-    acts = mechanism is not None and lines.kind in mechanism.kinds
-    return acts and mechanism is not None and mechanism.unsupported(lines.campaign, lines.kind) is None
+    if mechanism is None or lines.kind not in mechanism.kinds or mechanism.of == "rig":
+        return False
+    return mechanism.unsupported(lines.campaign, lines.kind) is None
 
 
 def _in_model(

@@ -29,7 +29,7 @@ class InstrumentCompliance(Mechanism):
     indentation, or the shortening of a block, and the sample looks too soft, most of all at high force."""
     law = """measured displacement = indentation (of a block or strip: shortening or extension) + F/k, with the F that
     is measured: relaxed, and adhesive."""
-    assumptions = "a linear stage, the same in all recordings; without friction or backlash."
+    assumptions = "a linear stage, the same in all recordings of a kind; without friction or backlash."
     source = "Oliver & Pharr, J. Mater. Res. 7 (1992) 1564 (frame compliance)."
     stage = Stage.CURVE
     order = 10
