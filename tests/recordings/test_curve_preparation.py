@@ -162,6 +162,21 @@ def test_a_leap_of_the_force_ends_the_curve_of_a_block_or_strip(sign: int, slipp
     assert modulus_mpa(read) == pytest.approx(1.0, rel=0.03)
 
 
+@pytest.mark.parametrize("samples_after", [300, 3, 1])
+def test_a_strip_that_breaks_ends_its_curve(samples_after: int) -> None:
+    """What the cell reads after it, however long the machine goes on, is no force of the strip."""
+    travel = np.linspace(0.0, 5.0, 1000)[: 600 + samples_after]
+    force = np.pi / 4 * 5**2 * ((1 + travel / 20) ** -2 - (1 + travel / 20)) / 3
+    force = np.where(np.arange(len(travel)) < 600, force, 0.0)
+    force += 1e-3 * np.random.default_rng(3).normal(size=len(force)) * np.abs(force).max()
+    sample = {"id": "t", "kind": "compression", "sample_height_mm": 20.0, "sample_diameter_mm": 5.0}
+    sample |= {"displacement_mm": (-travel).tolist(), "force_n": force.tolist()}
+    read, _ = from_dict({"schema": "campaign/1", "name": "t", "skin": {"poisson_ratio": 0.5}, "recordings": [sample]})
+    found = {finding.code: finding.arguments for finding in implausible(read)}
+    assert found["force_steps"]["samples"] == samples_after
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.01)
+
+
 def test_a_held_reading_of_the_force_is_no_leap() -> None:
     """A channel that is read at a tenth of the rate leaps everywhere by as much."""
     depth = ways(-0.1, 0.3, -0.1)

@@ -519,7 +519,7 @@ def _until_force_step(
     curve: CurveRecording, finite: Indices, travel: Floats, force: Floats
 ) -> tuple[CurveRecording, list[Finding]]:
     """The samples before a leap of the force alone: those after it are not of the same contact or grip."""
-    sample = force_step(travel, force)
+    sample = force_step(travel, force, sphere=curve.has_sphere)
     if sample is None:
         return curve, []
     arguments = {

@@ -88,13 +88,13 @@ _AROUND = 20  # samples on either side of a step of the force: more than a slow 
 _ONE_WAY = 0.9  # least travel over its range where it does not turn: with noise, or at a turn far from the step
 
 
-def force_step(travel: Floats, force: Floats) -> int | None:
+def force_step(travel: Floats, force: Floats, *, sphere: bool) -> int | None:
     """The first sample before which the force of a loaded sample leaps to another course while the travel goes on
     evenly, or None: the sample tears or slips, or the range of the cell is switched.
 
     The change of the force there stands off those around it, as no law makes it. At a hold or a turn friction may
-    reverse: there none is looked for. Snap-in and pull-off are leaps to or from the air, or of a force of the other
-    sign.
+    reverse: there none is looked for. Of a `sphere` snap-in and pull-off are leaps to or from the air, or of a force of
+    the other sign; a block or strip that bears nothing any more is broken.
     """
     changed, moved = np.diff(force, prepend=force[0]), np.abs(np.diff(travel, prepend=travel[0]))
     away = force - force[0]
@@ -103,14 +103,16 @@ def force_step(travel: Floats, force: Floats) -> int | None:
     noise = max(roughness(force), digit)
     for sample in np.flatnonzero(np.abs(changed) > _SUDDEN * noise).tolist():
         first, end = sample - _AROUND, sample + _AROUND + 1
-        if first < 1 or end > len(force) or pressed[sample - 1 : sample + 1].min() < _SUDDEN * noise:
+        before, after = pressed[sample - 1 : sample + 1] >= _SUDDEN * noise
+        # Where a strip breaks a machine may stop: what follows may be short
+        if first < 1 or not before or (end > len(force) if after else sphere):
             continue
         around, steps = (np.delete(column[first:end], _AROUND) for column in (changed, moved))
         usual = float(np.median(around))
         leaps = abs(changed[sample] - usual) > _SUDDEN * max(float(np.abs(around - usual).max()), noise)
-        before, after = (np.median(np.diff(travel[part])) for part in (slice(first, sample), slice(sample, end)))
-        one_way = abs(travel[end - 1] - travel[first]) > _ONE_WAY * np.ptp(travel[first:end])
-        if leaps and one_way and before * after > 0 and moved[sample] <= 2 * np.median(steps):
+        way_in, way_on = (np.median(np.diff(travel[part])) for part in (slice(first, sample), slice(sample - 1, end)))
+        one_way = abs(travel[first:end][-1] - travel[first]) > _ONE_WAY * np.ptp(travel[first:end])
+        if leaps and one_way and way_in * way_on > 0 and moved[sample] <= 2 * np.median(steps):
             return sample
     return None
 
