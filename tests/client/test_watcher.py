@@ -12,8 +12,8 @@ import pytest
 
 from tests.support.store_server import campaign
 from underskin.client.service_client import Client
-from underskin.client.watch import Journal, WatchedFolder, Watcher
-from underskin.errors import ServiceError
+from underskin.client.watch import NAME, Journal, Target, WatchedFolder, Watcher
+from underskin.errors import ServiceError, UnderskinError
 
 SETTLE_S = 5.0
 
@@ -209,3 +209,33 @@ def test_retries_end_restart_sends(tmp_path: Path, clock: list[float]) -> None:
         again.step(0)
         again.step()
         assert [name for name, _ in again.service.kept] == ["large.json"]
+
+
+def test_a_line_that_a_power_cut_left_unfinished_costs_itself_alone(tmp_path: Path) -> None:
+    """The journal is read without it, and what is added next stands on a line of its own."""
+    target = Target("http://bench", "palm", "terms")
+
+    def known(*digests: str, added: str | None = None) -> list[bool]:
+        journal = Journal(tmp_path)
+        if added is not None:
+            journal.add(target, added, "file.csv", ["c-1"])
+        journal.close()
+        journal = Journal(tmp_path)
+        journal.close()
+        return [journal.find(target, digest) is not None for digest in digests]
+
+    assert known("a", added="a") == [True]
+    first = (tmp_path / NAME).stat().st_size
+    assert known("a", "b", added="b") == [True, True]
+    whole = (tmp_path / NAME).read_bytes()
+    for cut in range(first, len(whole)):
+        (tmp_path / NAME).write_bytes(whole[:cut])
+        assert known("a", "b") == [True, False]
+        assert known("a", "b", "c", added="c") == [True, False, True]
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"schema": "watch/3"}\n', '{"schema": "watch/2"}\n{"sha256": 1}\n'])
+def test_a_journal_that_cannot_be_understood_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / NAME).write_text(text)
+    with pytest.raises(UnderskinError, match=r"cannot be read: .*move it away"):
+        Journal(tmp_path)

@@ -105,6 +105,15 @@ def altered_hdf5(change: Callable[[Any], None]) -> bytes:
     return buffer.getvalue()
 
 
+@pytest.mark.usefixtures("understood_here")
+def test_references_are_no_values() -> None:
+    buffer = io.BytesIO(hdf5(EVERYTHING))
+    with h5py.File(buffer, "r+") as target:
+        target["recordings/000000"].attrs["sensor"] = target["skin"].ref
+    problems = read_file(buffer.getvalue(), "a.h5").problems
+    assert [(problem.recording, problem.field) for problem in problems] == [("r1", "sensor")]
+
+
 def test_a_file_that_takes_too_long_is_refused(stream: BinaryIO) -> None:
     with pytest.raises(FileError, match=r"slow\.tdms: reading it as TDMS took more than 0\.02 s"):
         parse_apart("TDMS", stream, "slow.tdms", ParsingLimits(seconds=0.02))

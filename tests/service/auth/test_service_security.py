@@ -13,7 +13,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.auth.keys import KeyStore
+from service.auth.keys import KeyStore, KeysUnreadable
 from service.auth.session import COOKIE, logged_in
 from tests.service.connections import BODIES
 from tests.service.requests import SIGMA, all_routes, problem_of
@@ -236,6 +236,18 @@ def test_keys_are_told_apart_by_name(keyed: Keyed) -> None:
     assert "'lab'" in refusal(keyed.folder, "key", "create", "lab")
     with pytest.raises(InvalidInput, match="'nobody'"):
         keys_in(keyed.folder).revoke("nobody")
+
+
+def test_a_revoked_key_leaves_the_others(tmp_path: Path) -> None:
+    """And a file of keys of another shape holds none: nothing is let in."""
+    keys = keys_in(tmp_path)
+    tokens = [keys.create(name, "read").encode() for name in ("lab", "guest")]
+    keys.revoke("guest")
+    assert [key and key.name for key in map(keys_in(tmp_path).find, tokens)] == ["lab", None]
+    for text in ("{}", "[]", "null", '{"keys": [1]}', '{"keys": [{"name": "a", "scope": "read"}]}'):
+        keys.path.write_text(text)
+        with pytest.raises(KeysUnreadable):
+            keys_in(tmp_path).find(tokens[0])
 
 
 def test_a_damaged_file_of_keys_opens_nothing(tmp_path: Path) -> None:
