@@ -127,8 +127,9 @@ class InvertedFile:
         results = {modulus.recording: modulus.result for modulus in self.moduli}
         for block in self.reading.campaign.of(CompressionRecording):
             result, share = results[block.id], 0.125 * (block.sample_diameter_mm / block.sample_height_mm) ** 2
-            is_pressed = isinstance(result, CompressionModulus) and result.is_pressed
-            if is_pressed and share > result.uncertainty / result.modulus:
+            if not isinstance(result, CompressionModulus) or not result.is_pressed:
+                continue
+            if share > result.uncertainty / result.modulus:
                 raised.append(100 * share)
         if not raised:
             return ""
