@@ -72,6 +72,11 @@ def test_scatter_of_readings(gains: tuple[float, ...], word: str) -> None:
     assert word in note
 
 
+def test_scatter_is_told_of_finite_readings() -> None:
+    (note,) = frf([0, 0, 1, 1, 2, 3, 4], {1: "inf"}).warnings
+    assert "averaged, all equal" in note
+
+
 @pytest.mark.parametrize("gains", [(1.0, 0.7), (1.0, 0.9, 1.1, 0.5), (1.0, -1.0)])
 def test_readings_of_several_recordings_are_no_average(gains: tuple[float, ...]) -> None:
     """Readings that differ alike at all frequencies, by a factor or in sign, are refused: which is right shows not."""
