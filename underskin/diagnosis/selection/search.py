@@ -24,7 +24,8 @@ import numpy as np
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.selection.answers import Search, remainder
+from underskin.diagnosis.inference.fit import Fitter, Scatter
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, free_modulus_problem
 from underskin.diagnosis.selection.priors import LARGEST, even_laws, least_evidence
 from underskin.mechanisms.base import Kind, Stage, Unsupported
@@ -36,6 +37,8 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
+_SMOOTH_ERROR = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior expects one
+_ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
 _DESCRIBES_LINES = 10.0  # nats of evidence over the base model from which a law's prediction is subtracted
 _PARENTS, _LARGEST_OF_ONE_KIND = 3, 3
 _PAIRED = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT, Stage.LOAD_INCREMENT)  # of which two may cancel
@@ -166,7 +169,7 @@ class _Sets:
         """Fit pairs of curves from starts over the parameters of both, where the best set leaves something for that to
         matter; a fit that is better takes the place of the one from a single."""
         best = min(self.explanations.values(), key=lambda fitted: fitted.best.cost)
-        if remainder(best) is None:
+        if smooth_error_gain(best) < _SMOOTH_ERROR:
             return
         self._improve(
             [Request(pair.names, nuisances=None if Adhesion.name in pair.names else best.point) for pair in pairs]
@@ -185,6 +188,18 @@ class _Sets:
             fitted = self.problem.explain(replace(request, rival=rival), best)
             if fitted is not None:
                 self.explanations[names] = fitted
+
+
+def smooth_error_gain(explanation: Explanation) -> float:
+    """Nats that a smooth error brings an explanation of curves over the least one and rougher noise."""
+    fitter = Fitter(explanation.best.hypothesis)
+    at = fitter.evaluate(fitter.at(explanation.point), slopes=False)
+    points = at.points[np.zeros(len(_ROUGHER), dtype=np.intp)]
+    covariance = points.covariance.copy()
+    covariance[:, Scatter.LEVEL] += np.log(_ROUGHER)
+    covariance[:, Scatter.SMOOTH] = explanation.best.hypothesis.covariance[Scatter.SMOOTH].low
+    without = fitter.evaluate(replace(points, covariance=covariance), slopes=False)
+    return float(without.cost.min() - at.cost[0])
 
 
 def frf_problem(
