@@ -113,9 +113,9 @@ def test_no_modulus_where_nothing_describes_the_curve(table: SigmaTable) -> None
     assert "youngs_modulus" not in report["fit"]["after"]
 
 
-def on_frame(stiffness: float, noise: float, *heights: float) -> underskin.Report:
+def on_frame(stiffness: float, noise: float, *heights: float, largest: float = 0.4) -> underskin.Report:
     """The report on blocks of 3 MPa and 10 mm diameter on a frame of so many N/mm, whose E holds 3 MPa."""
-    strain, blocks = np.linspace(0.0, 0.4, 200), []
+    strain, blocks = np.linspace(0.0, largest, 200), []
     for number, height in enumerate(heights):
         force = pi / 4 * 10.0**2 * ((1 - strain) ** -2 - (1 - strain))
         force += noise * force.max() * np.random.default_rng(number).normal(size=len(force))
@@ -140,6 +140,12 @@ def test_a_frame_that_gives_is_a_rival_of_softening(stiffness: float) -> None:
     assert "a block of steel" in report.statement
     assert report.next_experiment is not None
     assert "A block of steel" in report.next_experiment.statement
+
+
+@pytest.mark.parametrize("largest", [0.06, 0.12])
+def test_a_soft_frame_is_no_softening_of_a_slightly_pressed_block(largest: float) -> None:
+    """A desktop tester of 100 N/mm: the block is not said to soften."""
+    assert on_frame(100.0, 2e-3, 10.0, largest=largest).verdict == "ambiguous"
 
 
 def test_blocks_of_two_heights_tell_a_frame_that_gives() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.sphere_curves import campaign, hertz, pressed, ways
-from underskin import read_file
+from underskin import diagnose, read_file
 from underskin.errors import InvalidInput
 from underskin.findings.codes import FindingCode
 from underskin.findings.finding import Finding
@@ -175,6 +175,31 @@ def test_a_strip_that_breaks_ends_its_curve(samples_after: int) -> None:
     (samples,) = (finding.arguments["samples"] for finding in implausible(read) if finding.code == "force_steps")
     assert samples == samples_after
     assert modulus_mpa(read) == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_leap_in_a_noisy_curve_of_few_samples_is_found() -> None:
+    """The cell's range changes by a tenth under a sphere of 4 mm: the modulus is that of the samples before."""
+    depth = np.linspace(-0.12, 0.6, 150)
+    force = 16 / 9 * 2 * np.maximum(depth, 0.0) ** 1.5
+    force = np.where(np.arange(150) < 90, force, 1.1 * force)
+    force += 3e-3 * force.max() * np.random.default_rng(7).normal(size=150)
+    report = diagnose(campaign(depth, force, timed=False, indenter_radius_mm=4.0)).document
+    assert "force_steps" in {finding["code"] for finding in report["findings"]}
+    modulus = report["fit"]["after"]["youngs_modulus"]
+    assert modulus["low"] < 1 < modulus["high"]
+
+
+def test_one_leap_among_changes_below_the_noise_tells_no_sign() -> None:
+    """A strip slips in its clamp by 2 % and is not let go: only that change of the force stands off the noise."""
+    extension = np.linspace(0.0, 20.0, 200)
+    stretch = 1 + (extension - 1.0 * (np.arange(200) >= 100)) / 50
+    force = 20 * (stretch - stretch**-2) / 3
+    force += 3e-3 * force.max() * np.random.default_rng(7).normal(size=200)
+    sample = {"id": "s", "kind": "compression", "sample_height_mm": 50.0, "sample_diameter_mm": (80 / np.pi) ** 0.5}
+    sample |= {"displacement_mm": (-extension).tolist(), "force_n": (-force).tolist()}
+    read, _ = from_dict({"schema": "campaign/1", "name": "s", "skin": {"poisson_ratio": 0.5}, "recordings": [sample]})
+    assert only(read).code == "force_steps"
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.02)
 
 
 def test_a_held_reading_of_the_force_is_no_leap() -> None:

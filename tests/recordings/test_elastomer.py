@@ -141,3 +141,16 @@ def test_interval_of_neo_hookean_samples(pulled: bool, largest: tuple[float, flo
         inside.append(abs(found.modulus - 1e6) < 1.96 * found.uncertainty)
         assert found.uncertainty < 0.06e6
     assert sum(inside) >= 35  # fewer with probability 0.014
+
+
+def test_a_block_that_is_only_pressed_is_in_no_tension() -> None:
+    """Its machine gives by 1 mm at 200 N, and it stiffens: a line fits best, and meets the force 0 before the foot."""
+    strain = np.linspace(0.0, 0.35, 120)
+    stretch = 1 - strain
+    invariant = stretch**2 + 2 / stretch - 3
+    stress = (stretch**-2 - stretch) / 3 * (1 + 0.6 * invariant + 0.06 * invariant**2)
+    force = 1e6 * np.pi / 4 * 0.02**2 * stress
+    found = compression_modulus(0.01 * strain + force / 2e5, force, 0.01, 0.02)
+    assert found.is_straight
+    assert found.load == "compression"
+    assert "pulled" not in found.statement

@@ -139,15 +139,24 @@ def _softens(force: Floats, strain: Floats) -> bool:
 def _relative_sign(force: Floats, travel: Floats) -> int:
     """1 where the force mostly grows with the travel, -1 where it falls, 0 where undecided.
 
-    Changes of block means are counted, so that a jump counts once.
+    Changes of block means are counted, so that a jump counts once; where fewer than `_LEAST_TELLING` exceed the noise,
+    those of longer blocks are, lest a single jump decide.
     """
-    starts = np.linspace(0, len(force), min(len(force), _COMPARED_BLOCKS), endpoint=False).astype(np.intp)
+    blocks = min(len(force), _COMPARED_BLOCKS)
+    while (len(votes := _votes(force, travel, blocks))) < _LEAST_TELLING < blocks // 2:
+        blocks //= 2
+    return int(np.sign(votes.sum())) if abs(votes.sum()) > _AGREE * len(votes) else 0
+
+
+def _votes(force: Floats, travel: Floats, blocks: int) -> Floats:
+    """The signs of force over travel of the changes between block means that exceed the noise."""
+    starts = np.linspace(0, len(force), blocks, endpoint=False).astype(np.intp)
     counts = np.diff(np.append(starts, len(force)))
     change, moved = (np.diff(np.add.reduceat(column, starts) / counts) for column in (force, travel))
     noise = roughness(force) * np.sqrt(2 / counts.min())
     counted = np.abs(change) > max(_BEYOND_NOISE * min(noise, float(np.ptp(force)) / 20), _CHANGE * np.ptp(force))
-    votes = np.sign(change * moved)[counted]
-    return int(np.sign(votes.sum())) if abs(votes.sum()) > _AGREE * len(votes) else 0
+    votes: Floats = np.sign(change * moved)[counted]
+    return votes
 
 
 def _deep_side(force: Floats, travel: Floats, turns: Indices, relative_sign: int) -> int:

@@ -85,6 +85,7 @@ def reading_steps(travel: Floats, force: Floats) -> Floats:
 
 
 _AROUND = 20  # samples on either side of a step of the force: more than a slow channel holds a value
+_APART = 3.0  # times the largest of these changes: of Gaussian noise one sample in 7 million
 _ONE_WAY = 0.9  # least travel over its range where it does not turn: with noise, or at a turn far from the step
 
 
@@ -109,7 +110,7 @@ def force_step(travel: Floats, force: Floats, *, sphere: bool) -> int | None:
             continue
         around, steps = (np.delete(column[first:end], _AROUND) for column in (changed, moved))
         usual = float(np.median(around))
-        leaps = abs(changed[sample] - usual) > _SUDDEN * max(float(np.abs(around - usual).max()), noise)
+        leaps = abs(changed[sample] - usual) > _APART * max(float(np.abs(around - usual).max()), noise)
         way_in, way_on = (np.median(np.diff(travel[part])) for part in (slice(first, sample), slice(sample - 1, end)))
         one_way = abs(travel[first:end][-1] - travel[first]) > _ONE_WAY * np.ptp(travel[first:end])
         if leaps and one_way and way_in * way_on > 0 and moved[sample] <= 2 * np.median(steps):

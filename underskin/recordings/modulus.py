@@ -44,7 +44,9 @@ def loading_branch(along: Floats, load: Floats) -> tuple[Floats, Floats]:
     if top + 1 < FEWEST:
         raise too_few("force_n", f"largest at entry {top}", f"must load over at least {FEWEST} entries")
     if along[top] == along[0]:
-        raise unusable("displacement_mm", float(along[top]), "must change while the force rises")
+        raise unusable(
+            "displacement_mm", None, "must differ between the first sample and the one with the largest force"
+        )
     return along[: top + 1], load[: top + 1]
 
 
@@ -181,7 +183,7 @@ def _by_law(
     return CompressionModulus(
         modulus=slope,
         uncertainty=float(np.hypot(_deviation(columns, deviation, zero), change)),
-        first_strain=first_strain if straight or not is_one_sided(stress) else max(first_strain, 0.0),  # else slack
+        first_strain=max(first_strain, 0.0) if is_one_sided(stress) else first_strain,  # slack before
         last_strain=float(strain[last] - foot_strain),
         leaves_at_strain=None if leaves is None else float(strain[leaves] - foot_strain),
         leaves_at_stress=None if leaves is None else float(binned[leaves]),

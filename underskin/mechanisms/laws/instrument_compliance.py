@@ -13,10 +13,10 @@ from underskin.recordings.campaign import Conditions, IndentationConditions
 _REASON = (
     "an instrument is about as stiff as what it presses: stages of spheres of millimetres 10 to 1000 N/mm, those "
     "of spheres of micrometres 0.1 to 1000 N/m; 30 N/mm for each mm of radius, within a factor of 20; under a block or "
-    "strip 500 N/mm, of a cell that gives 0.1 mm at 50 N, to 8000 of a machine's frame: 2000, within a factor of 2.7"
+    "strip 70 N/mm, of a cell that gives 0.2 mm at 15 N, to 8000 of a machine's frame: 750, within a factor of 3.3"
 )
 _OF_RADIUS, _USUAL_RADIUS_MM = 30.0, 5.0  # N/mm for each mm
-_OF_FRAMES, _SD_OF_FRAMES = 2000.0, 1.0  # N/mm
+_OF_FRAMES, _SD_OF_FRAMES = 750.0, 1.2  # N/mm
 _SOFTEST_FRAME = 10.0  # N/mm, of a cell of 1 N that gives 0.1 mm
 _SD = 3.0
 
