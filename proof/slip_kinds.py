@@ -223,7 +223,8 @@ SLIPS: Mapping[str, tuple[MakeSlip, tuple[Reason, ...]]] = {
         polarity,
         (Reason.RECORDINGS_REVERSED, Reason.RECORDING_REVERSED, Reason.SENSOR_REVERSED, Reason.ALL_REVERSED),
     ),
-    "sensor at a tenth": (weak, (Reason.WEAK_SENSOR,)),
+    # A tenth is a range of an amplifier too: one sensor of four may then be the one that is right.
+    "sensor at a tenth": (weak, (Reason.WEAK_SENSOR, Reason.TWO_GROUPS)),
     "dead sensor": (dead, (Reason.SILENT_SENSOR, Reason.SILENT_RECORDING)),
     "warm-up, rising": (warm_up(-0.2), (Reason.WARM_UP,)),
     "warm-up, falling": (warm_up(0.3), (Reason.WARM_UP,)),
