@@ -53,7 +53,7 @@ from numpy.typing import ArrayLike
 
 from underskin.autodiff import Differentiated, constant
 from underskin.errors import out_of_range
-from underskin.physics.hankel_transform import hertz_transform, normal_stress, on_panels, tangential_stress
+from underskin.physics.hankel_transform import hertz_transform, normal_stress, tangential_stress
 from underskin.units import Floats
 
 _SMALLEST_K = 1e-12  # at k = 0 a frictionless base gives 0/0; the limits are reached long before
@@ -345,8 +345,12 @@ def mode_transforms(s: Floats, modes: int) -> Floats:
 
 def _nodes(largest: float) -> tuple[Floats, Floats]:
     """Gauss–Legendre nodes and weights on [0, 20], fine enough for products of modes up to the largest radius."""
+    x, w = np.polynomial.legendre.leggauss(16)
     panels = max(6, int(np.ceil(_END * 2 * largest / 16.0)))
-    return on_panels(np.concatenate([_FIRST_PANELS[:-1], np.linspace(_FIRST_PANELS[-1], _END, panels + 1)]))
+    edges = np.concatenate([_FIRST_PANELS[:-1], np.linspace(_FIRST_PANELS[-1], _END, panels + 1)])
+    half = np.diff(edges)[:, None] / 2
+    k = edges[:-1, None] + half * (1 + x)
+    return k.ravel(), (half * w).ravel()
 
 
 def _last_axis(x: Differentiated, index: int | slice | None) -> Differentiated:

@@ -96,12 +96,8 @@ def _transform(
 def wave_numbers(distance: float) -> tuple[Floats, Floats]:
     """Gauss–Legendre nodes and weights of k on panels of [0, 44], short enough for oscillations over a distance."""
     panels = 24 + int(np.ceil(_END * distance / 12.0))
-    return on_panels(np.linspace(0.0, _END, panels + 1))
-
-
-def on_panels(edges: Floats) -> tuple[Floats, Floats]:
-    """Gauss–Legendre nodes and weights, 16 between each edge (edges,) and the next."""
     x, w = np.polynomial.legendre.leggauss(16)
+    edges = np.linspace(0.0, _END, panels + 1)
     half = np.diff(edges)[:, None] / 2
     k = edges[:-1, None] + half * (1 + x)
     return k.ravel(), (half * w).ravel()

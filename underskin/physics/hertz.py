@@ -93,9 +93,28 @@ def load_parameter(preload: ArrayLike, indenter_radius: ArrayLike, youngs_modulu
     return np.asarray(preload, dtype=float) / (np.square(indenter_radius) * np.asarray(youngs_modulus, dtype=float))
 
 
+def contact_radius_over_indenter_radius(load_parameter: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Floats:
+    """Contact radius over indenter radius, (a/R)³ = (3/4)(1 − ν²) L.
+
+    Parameters
+    ----------
+    load_parameter : array_like
+        L [-].
+    poisson_ratio : array_like
+        ν [-].
+
+    Returns
+    -------
+    ndarray
+        a/R [-], of the broadcast shape.
+    """
+    return np.cbrt(0.75 * (1 - np.square(poisson_ratio)) * np.asarray(load_parameter, dtype=float))
+
+
 def peak_pressure_over_modulus(load_parameter: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Floats:
-    """Peak pressure over modulus, q0/E = (3/2π) [(3/4)(1 − ν²)]^(−2/3) L^(1/3): the strain measured by L, as is
-    (a/R)³ = (3/4)(1 − ν²) L. Of the shape to which L [-] and ν [-] broadcast.
+    """Peak pressure over modulus, q0/E = (3/2π) [(3/4)(1 − ν²)]^(−2/3) L^(1/3): the strain measured by L.
+
+    Parameters and result as in `contact_radius_over_indenter_radius`.
     """
     shape = np.cbrt(0.75 * (1 - np.square(poisson_ratio))) ** -2
     return 1.5 / np.pi * shape * np.cbrt(np.asarray(load_parameter, dtype=float))

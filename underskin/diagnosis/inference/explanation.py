@@ -53,9 +53,9 @@ _DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspac
 def best_starts(fitter: Fitter, request: "Request") -> Points:
     """The best of the local minima of a grid over the new mechanisms' prior quantiles, and of the values that the
     recordings suggest."""
-    grid = _Grid(fitter.hypothesis, request.parent)
+    grid = _Grid(fitter.hypothesis, request.known)
     initial = fitter.initial(grid.coordinates, request.start)
-    many_steps = fitter.covariance_indices.size and request.parent is None
+    many_steps = fitter.covariance_indices.size and request.known is None
     at = fitter.update_noise_levels(initial, _NOISE_LEVEL_STEPS_WITHOUT_PARENT if many_steps else _NOISE_LEVEL_STEPS)
     cost = at.cost[: grid.size].reshape(grid.shape)
     # Many steps move the mechanisms' covariance parameters off the grid, so that all its points are kept.
@@ -75,7 +75,8 @@ class _Grid:
 
     def __init__(self, hypothesis: Hypothesis, explained: "Explanation | None") -> None:
         slices = parameter_slices(hypothesis.model.names, hypothesis.lines)
-        parent = {} if explained is None else {name: explained.coordinates(name) for name in explained.names}
+        known = () if explained is None else explained.names
+        parent = {name: explained.coordinates(name) for name in known if explained and name in slices}
         # A mechanism also counts as new if its parameters differ from those in the parent.
         self.new_names = [name for name, span in slices.items() if len(parent.get(name, ())) != span.stop - span.start]
         parameters = {name: hypothesis.model.parameters[slices[name]] for name in self.new_names}
@@ -142,7 +143,7 @@ def _starts_of_curves(
     if fitter.lines.kind == "indentation" and (moves_contact or request.start is None):
         candidates = _with_contact_points(fitter, candidates)
     begins_at_guesses = any(isinstance(fitter.lines.mechanisms[name], UnlistedLaw) for name in new_names)
-    count = _STARTS_FROM_PARENT if request.parent is not None and not begins_at_guesses else _STARTS
+    count = _STARTS_FROM_PARENT if request.known is not None and not begins_at_guesses else _STARTS
     starts = candidates.points[np.sort(_cheapest(candidates)[:count])]
     if not (moves_contact and guess_count):
         return starts
@@ -251,13 +252,19 @@ class Request:
     names: tuple[str, ...]
     parent: Explanation | None = None
     nuisances: FitPoint | None = None  # starting values of the nuisances, if not the parent's
+    larger: Explanation | None = None  # of the set with one mechanism more, from whose values the fit begins
     rival: Explanation | None = None  # what a fit must gain on, if not on the parent's
     never_pruned: bool = False  # fitted to convergence and explained, however far behind and even without gain
 
     @property
     def start(self) -> FitPoint | None:
         """The point with the nuisances' starting values; None for their priors' centres."""
-        return self.parent.point if self.nuisances is None and self.parent is not None else self.nuisances
+        return self.known.point if self.nuisances is None and self.known is not None else self.nuisances
+
+    @property
+    def known(self) -> Explanation | None:
+        """The explanation with the mechanisms' starting values."""
+        return self.larger or self.parent
 
     @property
     def without_scatter(self) -> bool:

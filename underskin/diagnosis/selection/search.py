@@ -123,6 +123,7 @@ class _Sets:
             pairs = self._pairs(self.names)
             self.explain(pairs)
             self._refit_from_prior(pairs)
+            self._refit_smaller()
             return
         requests = [
             Request(self.ordered(frozenset({*parent.names, name})), parent)
@@ -142,6 +143,8 @@ class _Sets:
                 if name not in self.contact and (name in best.names or mechanisms[name].stage in _PAIRED)
             ]
             self.explain(beside, however_far=True)
+        if curves:
+            self._refit_smaller()
 
     def _pairs(self, names: Sequence[str]) -> list[Request]:
         """Every pair, from the better of its two."""
@@ -174,6 +177,13 @@ class _Sets:
         self._improve(
             [Request(pair.names, nuisances=None if Adhesion.name in pair.names else best.point) for pair in pairs]
         )
+
+    def _refit_smaller(self) -> None:
+        """Fit the sets with one mechanism less than the best one from its values: a law that hardly acts may have led
+        the others out of a lesser minimum."""
+        best = max(self.explanations.values(), key=self.search.log_weight)
+        smaller = [frozenset(best.names) - {name} for name in best.names if len(best.names) > 1]
+        self._improve([Request(self.ordered(names), larger=best) for names in smaller])
 
     def _improve(self, requests: Sequence[Request]) -> None:
         """Fits that are better take the place of those before."""
