@@ -18,7 +18,7 @@ from functools import cache
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from underskin import errors
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, out_of_range, too_few, wrong_type
@@ -26,7 +26,7 @@ from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.recordings import validation as field
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.validation import shown
-from underskin.units import Complexes, Floats, Indices, checked, finite, non_negative, to_si
+from underskin.units import Complexes, Floats, checked, finite, non_negative, to_si
 
 DEFAULT_KIND = "frf"  # of a recording whose document states none
 
@@ -567,17 +567,6 @@ class RecordingProblem:
     def as_error(self, field: str) -> InvalidInput:
         """The problem as an error of a field."""
         return InvalidInput(field, self.value, self.allowed, code=self.code)
-
-
-def finite_rows(curve: CurveRecording) -> Indices:
-    """The samples of a curve at which displacement and force are finite."""
-    return np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
-
-
-def samples_of(curve: CurveRecording, rows: NDArray[Any]) -> CurveRecording:
-    """A curve with only some of its samples."""
-    time = None if curve.time_s is None else curve.time_s[rows]
-    return replace(curve, displacement_mm=curve.displacement_mm[rows], force_n=curve.force_n[rows], time_s=time)
 
 
 def frf_recordings(campaign: Campaign) -> list[FrfRecording]:

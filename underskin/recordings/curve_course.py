@@ -9,7 +9,7 @@ magnitude matters.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from typing import Any
 
@@ -27,6 +27,17 @@ from underskin.recordings.campaign import (
 from underskin.units import FORCES, Floats, Indices, Mask
 
 _BEYOND_NOISE = 3.0  # standard deviations; a false jump only ends a mean early
+
+
+def finite_rows(curve: CurveRecording) -> Indices:
+    """The samples of a curve at which displacement and force are finite."""
+    return np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
+
+
+def samples_of(curve: CurveRecording, rows: Indices) -> CurveRecording:
+    """A curve with only some of its samples."""
+    time = None if curve.time_s is None else curve.time_s[rows]
+    return replace(curve, displacement_mm=curve.displacement_mm[rows], force_n=curve.force_n[rows], time_s=time)
 
 
 def roughness(force: Floats) -> float:
@@ -588,7 +599,7 @@ def _slips(modulus_mpa: float, declared_mpa: float | None, power: float) -> tupl
 
 def apparent_mpa(curve: CurveRecording, poisson_ratio: float) -> float:
     """The apparent modulus [MPa]; NaN where the curve does not load."""
-    finite = np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n)
+    finite = finite_rows(curve)
     displacement: Floats = curve.displacement_mm[finite]
     force: Floats = curve.force_n[finite]
     if len(displacement) < 2:

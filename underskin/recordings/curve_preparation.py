@@ -23,8 +23,16 @@ import numpy as np
 from underskin.errors import unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import Campaign, CurveRecording, finite_rows, samples_of
-from underskin.recordings.curve_course import PACE, RETURN, is_one_sided, roughness, turning_points
+from underskin.recordings.campaign import Campaign, CurveRecording
+from underskin.recordings.curve_course import (
+    PACE,
+    RETURN,
+    finite_rows,
+    is_one_sided,
+    roughness,
+    samples_of,
+    turning_points,
+)
 from underskin.recordings.damaged_readings import force_step, marks, reading_steps, spikes, without_damaged
 from underskin.recordings.periodic_error import periodic_error
 from underskin.units import Floats, Indices, Mask

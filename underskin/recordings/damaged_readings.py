@@ -4,8 +4,8 @@ import numpy as np
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import CurveRecording, finite_rows, samples_of
-from underskin.recordings.curve_course import roughness
+from underskin.recordings.campaign import CurveRecording
+from underskin.recordings.curve_course import finite_rows, roughness, samples_of
 from underskin.units import Floats, Mask
 
 _LEAST = 16  # marks, or samples among which a spike can be told

@@ -43,9 +43,15 @@ from underskin.recordings.campaign import (
     Recording,
     frf_recordings,
     offsets,
+)
+from underskin.recordings.curve_course import (
+    CurveLandmarks,
+    curve_landmarks,
+    foot,
+    hidden_samples,
+    roughness,
     samples_of,
 )
-from underskin.recordings.curve_course import CurveLandmarks, curve_landmarks, foot, hidden_samples, roughness
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.modulus import ZERO_SD
 from underskin.units import Complexes, Floats, Indices, Mask

@@ -75,8 +75,8 @@ class _Grid:
 
     def __init__(self, hypothesis: Hypothesis, explained: "Explanation | None") -> None:
         slices = parameter_slices(hypothesis.model.names, hypothesis.lines)
-        known = () if explained is None else explained.names
-        parent = {name: explained.coordinates(name) for name in known if explained and name in slices}
+        known = {} if explained is None else {name: explained.coordinates(name) for name in explained.names}
+        parent = {name: known[name] for name in slices if name in known}
         # A mechanism also counts as new if its parameters differ from those in the parent.
         self.new_names = [name for name, span in slices.items() if len(parent.get(name, ())) != span.stop - span.start]
         parameters = {name: hypothesis.model.parameters[slices[name]] for name in self.new_names}
