@@ -65,8 +65,11 @@ class CubicAxis:
         self.buckets = np.searchsorted(parts[1:-1], np.arange(parts[-1] + 1))
 
     def coefficients(self, values: Floats, axis: int) -> Floats:
-        """The spline's coefficients, along one axis of the values."""
-        return np.moveaxis(np.tensordot(self.to_coefficients, values, (1, axis)), 0, axis)
+        """The spline's coefficients, along one axis of the values.
+
+        Summed without BLAS, whose last bits depend on the number of its threads: a server and a script answer alike.
+        """
+        return np.moveaxis(np.einsum("ij,j...->i...", self.to_coefficients, np.moveaxis(values, axis, 0)), 0, axis)
 
     def disc_averages(self, offsets: Floats, disc_radius: float) -> Floats:
         """The matrix (offsets, nodes) that averages a radial profile, given at the nodes, over discs beside its axis.
