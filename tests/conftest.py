@@ -46,7 +46,7 @@ _STARTED_BY = {
 _NO_UNIT = {"server", "browser", "database", "slow", "soak"}
 # Folders of which one process of a run tests all, so that it starts servers, database and browser once; those before
 # others that hold them.
-_SHARING = ("tests/service/pages", "tests/service/store", "tests/service")
+_SHARING = ("tests/service/pages", "tests/service/store", "tests/service/jobs", "tests/service")
 _unit_test_under_way = ""
 
 

@@ -4,16 +4,19 @@ Such modules are about what lies above any store: clients, commands, sessions, f
 """
 
 import shutil
+import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 
+import psycopg
 import pytest
 
 from bench.soak import SOAK
-from service.store import database
+from service.store.engine import SQLITE_FILE
 from service.store.tables import metadata
 from tests.service.backends import BACKENDS
+from tests.service.waiting import LIMIT_S
 from tests.support import postgres
 from tests.support.store_server import Place, Server, running
 
@@ -89,10 +92,12 @@ def elsewhere(servers: Callable[[str], Server]) -> Server:
 
 def emptied(server: Server) -> Server:
     """The server without anything kept."""
-    store = database(server.place.database_url, server.place.folder)
-    with store.writing() as connection:
-        for table in reversed(metadata.sorted_tables):
-            connection.execute(table.delete())
-    store.close()
+    deleted = "".join(f"DELETE FROM {table.name};" for table in reversed(metadata.sorted_tables))
+    if server.place.database_url:
+        with psycopg.connect(server.place.database_url) as connection:
+            connection.execute(deleted.encode())
+    else:
+        with closing(sqlite3.connect(server.place.folder / SQLITE_FILE, timeout=LIMIT_S)) as file:
+            file.executescript(f"BEGIN IMMEDIATE;{deleted}COMMIT;")
     shutil.rmtree(server.place.folder / "backups", ignore_errors=True)
     return server

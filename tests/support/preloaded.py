@@ -21,6 +21,8 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
@@ -139,8 +141,12 @@ def _forking_process(at_the_start: tuple[tuple[str, str], ...]) -> socket.socket
 
 
 def _fork_as_asked(connection: socket.socket) -> None:
-    """Fork for each order and tell how each command ended; return in every command, exit after the last order."""
-    waiting: dict[int, int] = {}  # where to tell the status, by process
+    """Fork for each order and tell how each command ended, until there are no more orders.
+
+    A command ends as processes of `multiprocessing` do, without an interpreter that is taken apart: that would copy all
+    that is loaded, and take as long again as most commands do.
+    """
+    waiting: dict[BaseProcess, int] = {}  # where to tell the status, by process
     ended, wakeup = os.pipe()
     os.set_blocking(wakeup, False)
     signal.set_wakeup_fd(wakeup)
@@ -154,51 +160,55 @@ def _fork_as_asked(connection: socket.socket) -> None:
         if connection.fileno() in ready:
             order, files, _, _ = socket.recv_fds(connection, _LONGEST, 4)
             if not order:
-                sys.exit()
-            pid = os.fork()
-            if pid == 0:
-                signal.set_wakeup_fd(-1)
-                signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-                signal.signal(signal.SIGINT, signal.default_int_handler)
-                for file in (ended, wakeup, *waiting.values()):
-                    os.close(file)
-                _become(json.loads(order), files)
                 return
-            *streams, waiting[pid] = files
+            process = get_context("fork").Process(target=_run, args=(json.loads(order), files))
+            process.start()
+            *streams, waiting[process] = files
             for file in streams:
                 os.close(file)
-            connection.send(_STATUS.pack(pid))
+            connection.send(_STATUS.pack(process.pid))
 
 
-def _tell_the_ended(waiting: dict[int, int]) -> None:
+def _tell_the_ended(waiting: dict[BaseProcess, int]) -> None:
     for process, file in list(waiting.items()):
-        ended, status = os.waitpid(process, os.WNOHANG)
-        if ended:
+        if process.exitcode is not None:
             del waiting[process]
             with contextlib.suppress(BrokenPipeError):  # who asked may not wait for it
-                os.write(file, _STATUS.pack(os.waitstatus_to_exitcode(status)))
+                os.write(file, _STATUS.pack(process.exitcode))
             os.close(file)
+            process.close()
 
 
-def _become(order: dict[str, Any], files: list[int]) -> None:
-    """Take on the environment, folder, files and arguments of the command."""
-    *streams, status = files
-    os.close(status)
-    for descriptor, file in enumerate(streams):
+def _run(order: dict[str, Any], files: list[int]) -> None:
+    """Take on the environment, folder, files and arguments of the command, and run it."""
+    signal.set_wakeup_fd(-1)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for descriptor, file in enumerate(files[:-1]):
         os.dup2(file, descriptor)
-        os.close(file)
+    os.closerange(3, os.sysconf("SC_OPEN_MAX"))
+    sys.stdin = open(0, encoding=sys.stdout.encoding, closefd=False)  # noqa: SIM115  # open to its end
     os.environ.clear()
     os.environ.update(order["environment"])
     time.tzset()
     tempfile.tempdir = None  # which the environment names
     os.chdir(order["folder"])
     sys.argv = [str(UNDERSKIN), *order["arguments"]]
+    importlib.import_module("underskin.cli.app").main()
+
+
+def _load() -> None:
+    """Import what servers and commands do, and read the table that a server reads with its first campaign."""
+    for module in _MODULES:
+        importlib.import_module(module)
+    from underskin.surrogate.hdf5_format import CONTACT_TABLE, tables_folder
+    from underskin.surrogate.solved_contact import solved_contact
+
+    solved_contact(tables_folder() / CONTACT_TABLE)
 
 
 if __name__ == "__main__":
-    for module in _MODULES:
-        importlib.import_module(module)
+    _load()
     gc.freeze()  # or every command would copy and free all of it at its end
     with socket.socket(fileno=int(sys.argv[1])) as orders:
         _fork_as_asked(orders)
-    importlib.import_module("underskin.cli.app").main()

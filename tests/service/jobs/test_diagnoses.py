@@ -161,18 +161,14 @@ def test_fork_server_kept_ready_replaced_killed(working: Server) -> None:
     diagnosis_id = begun(working, small())
     (worker,) = await_workers(working, 1)
     assert _parent(str(worker))[0] == ready
-    assert awaited(working, diagnosis_id)["state"] == "done"
-    assert is_gone(worker)
-    assert await_workers(working, 1, "underskin-ready") == [ready]
-    diagnosis_id = begun(working, small(), "finger")
-    await_workers(working, 1)
     os.kill(ready, signal.SIGKILL)
     assert is_gone(ready)
     done = awaited(working, diagnosis_id)
     assert (done["state"], done["report"]) == ("done", small_report())
-    again = asked(working, sent(working, campaign("again", sensors=1)))
-    assert awaited(working, again)["state"] == "done"
-    assert await_workers(working, 1, "underskin-ready") != [ready]
+    assert is_gone(worker)
+    (another,) = await_workers(working, 1, "underskin-ready")
+    assert awaited(working, begun(working, small(), "finger"))["state"] == "done"
+    assert await_workers(working, 1, "underskin-ready") == [another]
 
 
 def test_a_worker_that_dies_is_told(working: Server) -> None:
@@ -190,21 +186,23 @@ def test_a_worker_that_dies_is_told(working: Server) -> None:
     assert working.http.delete(f"/v1/diagnoses/{again}").json()["state"] == "cancelled"
 
 
-def test_diagnoses_need_memory_fail(tmp_path: Path) -> None:
-    """Diagnoses that need more memory than they may have fail.
+def test_beyond_a_limit_fails(tmp_path: Path) -> None:
+    """Diagnoses that need more memory or time than they may have fail and name the setting.
 
     Of a campaign, and of several.
     """
     (tmp_path / "data").mkdir()
-    with running(Place(tmp_path / "data"), **SEVERAL, UNDERSKIN_DIAGNOSIS_MEMORY_MB="100") as server:
+    limits = {"UNDERSKIN_DIAGNOSIS_MEMORY_MB": "100", "UNDERSKIN_DIAGNOSIS_SECONDS": "1"}
+    with running(Place(tmp_path / "data"), **SEVERAL, **limits) as server:
+        slow = asked(server, sent(server, long(), "finger"))
         large = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=800)
         alone = begun(server, large)
         sent(server, small())
         together = server.http.post("/v1/skins/palm/diagnosis").json()["id"]
-        for diagnosis_id in (alone, together):
+        for diagnosis_id, setting in ((slow, "SECONDS"), (alone, "MEMORY_MB"), (together, "MEMORY_MB")):
             failed = awaited(server, diagnosis_id)
             assert (failed["state"], failed["report"]) == ("failed", None)
-            assert "UNDERSKIN_DIAGNOSIS_MEMORY_MB" in failed["reason"]
+            assert f"(UNDERSKIN_DIAGNOSIS_{setting})" in failed["reason"]
 
 
 def test_campaign_cannot_diagnosed_says_why(working: Server) -> None:

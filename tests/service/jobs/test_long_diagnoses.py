@@ -1,4 +1,4 @@
-"""Diagnoses that take long: ended at the limit of time, and no obstacle for short ones."""
+"""Diagnoses that take long are no obstacle for short ones."""
 
 import threading
 import time
@@ -14,11 +14,9 @@ from service.jobs.process import CampaignInput, WorkerProcesses
 from service.jobs.runner import Runner
 from service.store import Database, campaigns, diagnoses, open_store
 from tests.service.waiting import until
-from tests.support.diagnosed import asked, awaited, report, resonant, sent
-from tests.support.store_server import Place, campaign, running
+from tests.support.diagnosed import report
+from tests.support.store_server import campaign
 from underskin.recordings.campaign import parse
-
-BACKEND = "sqlite"
 
 
 class Played:
@@ -102,16 +100,3 @@ def test_short_diagnoses_not_wait_long_ones(store: Database, monkeypatch: pytest
         assert workers.begun.count("long") == 2
     finally:
         runs.stop()
-
-
-def test_beyond_limit_time_fails_setting(place: Place) -> None:
-    """One beyond the limit of time fails with its setting.
-
-    And the next one is done.
-    """
-    settings = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1", "UNDERSKIN_DIAGNOSIS_SECONDS": "2"}
-    with running(place, **settings) as server:
-        long = resonant("long", preloads=[0.5 + 0.1 * step for step in range(20)], lines=60)
-        ended = awaited(server, asked(server, sent(server, long)))
-        assert (ended["state"], ended["report"]) == ("failed", None)
-        assert ended["reason"] == "it takes more than 2 s on a processor (UNDERSKIN_DIAGNOSIS_SECONDS)"

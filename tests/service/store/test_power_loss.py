@@ -39,7 +39,7 @@ def test_nothing_acknowledged_lost_postgresql(tmp_path: Path, part: int) -> None
     folder = tmp_path / "server"
     folder.mkdir()
     with ExitStack() as stack:
-        cluster = stack.enter_context(postgres.running())
+        cluster = stack.enter_context(postgres.running(synced=True))
         place = Place(folder, cluster.new_database())
         with running(place, **NO_WORKERS):
             pass  # makes the tables

@@ -123,7 +123,7 @@ def test_no_old_deleted_newest_far_smaller(tmp_path: Path) -> None:
     assert "no old ones are deleted" in (tmp_path / "data.log").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_store_busy_long_ends_no_schedule(tmp_path: Path) -> None:
     """A store that is busy for long ends no schedule."""
     folder, data = tmp_path / "backups", tmp_path / "data"

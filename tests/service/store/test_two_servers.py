@@ -48,6 +48,7 @@ def test_either_acknowledged_kept_killed(places: list[Place]) -> None:
         check_kept(server, streams, 4 * BATCH)
 
 
+@pytest.mark.soak
 def test_diagnosis_killed_server_taken(places: list[Place]) -> None:
     """A diagnosis of a killed server is taken over."""
     with running(places[0], **_ONE) as first:
