@@ -192,7 +192,7 @@ def test_beyond_a_limit_fails(tmp_path: Path) -> None:
     Of a campaign, and of several.
     """
     (tmp_path / "data").mkdir()
-    limits = {"UNDERSKIN_DIAGNOSIS_MEMORY_MB": "100", "UNDERSKIN_DIAGNOSIS_SECONDS": "1"}
+    limits = {"UNDERSKIN_DIAGNOSIS_MEMORY_MB": "100", "UNDERSKIN_DIAGNOSIS_SECONDS": "2"}
     with running(Place(tmp_path / "data"), **SEVERAL, **limits) as server:
         slow = asked(server, sent(server, long(), "finger"))
         large = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=800)
