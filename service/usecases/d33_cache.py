@@ -177,7 +177,7 @@ def _derived(
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **_PAPER}
     document, inversion, failed = _computed(document, campaign, table, band_hz, excluded)
     if inversion is not None:
-        document["array_solved"] = _array_solved(campaign, table, band_hz, inversion)
+        document["array_solved"] = _array_solved(campaign, table, inversion)
     numbers = figure_data.numbers(campaign, inversion, spreads)
     if band_hz is None and not failed:
         _keep(store, row, soon, inversions.keep, table.sha256, document, numbers, of_sensors(document))
@@ -251,14 +251,12 @@ def _inverted(
     return {**of_inversion(inversion), "moduli": moduli, "left_out": excluded + without_modulus}, inversion
 
 
-def _array_solved(
-    campaign: Campaign, table: SigmaTable, band_hz: BandHz | None, inversion: "Inversion"
-) -> dict[str, float | None] | None:
+def _array_solved(campaign: Campaign, table: SigmaTable, inversion: "Inversion") -> dict[str, float | None] | None:
     """The field of `D33`; also null if the contact table cannot be read, which is logged."""
     from underskin.inversion.invert import array_d33_by_other
 
     try:
-        return of_array(array_d33_by_other(campaign, table, band_hz, inversion))
+        return of_array(array_d33_by_other(campaign, table, inversion))
     except TableError as error:
         logger.error("no d33 by the solved contact: %s", error)
         return None

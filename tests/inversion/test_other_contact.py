@@ -23,7 +23,7 @@ def test_a_thin_skin_in_contact_with_itself() -> None:
     assert solved.absolute_d33 is not None
     assert 1e12 * float(solved.absolute_d33.value) == pytest.approx(D33, rel=0.02)
     assert 1e12 * float(paper.absolute_d33.value) > 1.04 * D33
-    other = array_d33_by_other(campaign, TABLE, None, paper)
+    other = array_d33_by_other(campaign, TABLE, paper)
     assert other is not None
     assert float(other.value) == pytest.approx(float(solved.absolute_d33.value), rel=1e-12)
 
@@ -32,4 +32,4 @@ def test_a_thick_skin() -> None:
     """Where the two differ by less than 1 % nothing is stated."""
     thick = replace(THIN, thickness_mm=2.5, sensor_radius_mm=1.5, preloads_n=(0.3, 0.6))
     campaign = simulate(TABLE, thick, np.random.default_rng(2))
-    assert array_d33_by_other(campaign, TABLE, None, invert(campaign, TABLE)) is None
+    assert array_d33_by_other(campaign, TABLE, invert(campaign, TABLE)) is None

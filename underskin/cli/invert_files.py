@@ -339,18 +339,16 @@ def _inverted(
     other = ""
     try:
         inversion = invert(reading.campaign, contact_model(table, contact), band_hz)
-        other = _by_other_contact(reading, table, contact, band_hz, inversion)
+        other = _by_other_contact(reading, table, contact, inversion)
     except InvalidInput as error:
         inversion = error
     return InvertedFile(name, reading, inversion, elastomer.of_campaign(reading.campaign), other)
 
 
-def _by_other_contact(
-    reading: Reading, table: SigmaTable, contact: ContactName, band_hz: _BandHz | None, inversion: Inversion
-) -> str:
+def _by_other_contact(reading: Reading, table: SigmaTable, contact: ContactName, inversion: Inversion) -> str:
     """d33 of the array with the other contact model, in words; empty where it is nearly the same."""
     try:
-        other = array_d33_by_other(reading.campaign, table, band_hz, inversion, contact)
+        other = array_d33_by_other(reading.campaign, table, inversion, contact)
     except TableError as error:
         return f"d33 by the other contact is not known: {error}"
     if other is None:

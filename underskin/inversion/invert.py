@@ -212,20 +212,15 @@ def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
     return [Finding(Reason.BEHIND_FILTER, "", "d33_pc_per_n", arguments)]
 
 
-def _own_filters(
-    ids: Sequence[str], sensor: Indices, stacks: Sequence[Stack], zone: FlatZone, level: Floats, scatter: Floats
-) -> dict[int, Flag]:
+def _own_filters(ids: Sequence[str], sensor: Indices, levels: "Levels") -> dict[int, Flag]:
     """By its number, each sensor of several whose lines scatter more than those of the others because they lie behind
-    a filter of its own.
-
-    `level` [C/N] and `scatter`, relative, of each recording (recordings,) are those of the zone.
-    """
-    of_sensors = [np.abs(level * scatter)[sensor == index] for index in range(len(ids))]
+    a filter of its own."""
+    of_sensors = [np.abs(levels.level * levels.scatter)[sensor == index] for index in range(len(ids))]
     of_line = np.array([np.median(lines) for lines in of_sensors])
     usual = float(np.sort(of_line)[(len(ids) - 1) // 2])
     flags = {}
     for index in np.flatnonzero(of_line > _NOISY * usual).tolist():
-        behind = roll_off([stack.of(sensor[stack.rows] == index) for stack in stacks], zone, level)
+        behind = roll_off([one.of(sensor[one.rows] == index) for one in levels.stacks], levels.zone, levels.level)
         if behind is not None:
             flags[index] = Flag(ids[index], Reason.SENSOR_BEHIND_FILTER, behind.arguments)
     return flags
@@ -289,6 +284,39 @@ class Cells:
 
 
 @dataclass(frozen=True)
+class Levels:
+    """What recordings show whatever the contact: Re FRF of each usable one, averaged over the flat zone.
+
+    Attributes
+    ----------
+    recorded, measured : sequences
+        The usable recordings and their lines.
+    stacks : sequence of Stack
+        These lines without the phase of the charge's chain, of which `phase` [rad] was constant.
+    level, noise, scatter : ndarray, (recordings,)
+        As `band_average` has them, `scatter` relative, the others [C/N].
+    left_out, findings : sequences of Finding
+        On recordings that are not used, and on those that are used all the same.
+    """
+
+    recorded: Sequence[FrfRecording]
+    measured: Sequence[Frf]
+    stacks: Sequence[Stack]
+    phase: float
+    zone: FlatZone
+    level: Floats
+    noise: Floats
+    scatter: Floats
+    left_out: Sequence[Finding]
+    findings: Sequence[Finding]
+
+    @cached_property
+    def behind(self) -> RollOff | None:
+        """The filters that attenuate the whole band."""
+        return roll_off(self.stacks, self.zone, self.level)
+
+
+@dataclass(frozen=True)
 class Inversion:
     """The array's d33. `campaign_d33` (its interval is relative), `spread` (relative, over sensors), `gain` and
     `position` [m] come from the sensors that are neither dead, inverted, weak, strong nor behind a filter of
@@ -307,6 +335,7 @@ class Inversion:
     left_out: tuple[Finding | Flag, ...]  # each recording or sensor that the campaign's d33 does without
     findings: tuple[Finding, ...]  # suspicious data that are used all the same
     declared_percent: float  # standard deviation of all d33 together by the tolerances of the skin
+    levels: "Levels"
 
     @property
     def absolute_d33(self) -> Estimate | None:
@@ -344,19 +373,29 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     NoD33
         No frf recording lies within the domain of the table, has a line in the flat zone, and any charge.
     """
+    return _inverted(campaign, contact_model, _levels(campaign, band_hz))
+
+
+def _levels(campaign: Campaign, band_hz: tuple[float, float] | None) -> Levels:
     recorded = campaign.of(FrfRecording)
     if not recorded:
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
     for excess in excesses(campaign.skin):
         raise NoD33(f"skin.{excess.field}", excess.largest, f"skin.{excess.error}")
-    measured, recorded, left_out, of_recordings = _measured(recorded, units_checked=campaign.units_checked)
+    measured, recorded, left_out, findings = _measured(recorded, units_checked=campaign.units_checked)
     if not recorded:
         raise _none_usable(campaign, left_out)
     conditions = [(item.indenter_radius_mm, item.preload_n) for item in recorded]
-    frfs, delay, phase = without_chain_phase(stacked(measured), conditions)
-    zone = flat_zone(frfs, conditions, band_hz)
-    level, noise, scatter = band_average(frfs, zone)
-    zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
+    stacks, delay, phase = without_chain_phase(stacked(measured), conditions)
+    zone = flat_zone(stacks, conditions, band_hz)
+    level, noise, scatter = band_average(stacks, zone)
+    zone = replace(zone, reason=zone.reason + lower_half(stacks, zone, level, noise) + _delayed(delay))
+    return Levels(recorded, measured, stacks, phase, zone, level, noise, scatter, left_out, findings)
+
+
+def _inverted(campaign: Campaign, contact_model: ContactModel, levels: Levels) -> Inversion:
+    recorded, measured, zone = levels.recorded, levels.measured, levels.zone
+    level, noise = levels.level, levels.noise
     unusual_values = unlikely(campaign, recorded, [frf.frequency for frf in measured])
     slips = [*exchanged_values(campaign.skin, recorded, contact_model), *unusual_values]
     deciding = next((slip for slip in slips if slip.field not in UNUSED_FOR_D33), None)
@@ -367,8 +406,8 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = pressed_skin.reasons(recorded, campaign.skin, contact.transmitted, level, contact_model)
     far, of_far = far_contacts(recorded, level, contact.share)
-    left_out += [reason for reason, used in zip(reasons, inside | far, strict=True) if not used]
-    left_out += of_far
+    of_rows = [reason for reason, used in zip(reasons, inside | far, strict=True) if not used]
+    left_out = [*levels.left_out, *of_rows, *of_far]
     inside &= ~far
     if not inside.any():
         raise _none_usable(campaign, left_out)
@@ -389,7 +428,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         preload=to_si("preload_n", [item.preload_n for item in recorded]),
         frf=level,
         frf_uncertainty=noise,
-        line_scatter=scatter,
+        line_scatter=levels.scatter,
         sigma=np.where(inside, contact.positioned.sigma, np.nan),
         rel_error=contact.transmitted.rel_error,
         d33=np.where(inside, d33, np.nan),
@@ -397,13 +436,12 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         inside=inside,
     )
     common_uncertainty = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
-    behind = roll_off(frfs, zone, level)
-    own_filters = {} if behind else _own_filters(ids, sensor, frfs, zone, level, scatter)
+    own_filters = {} if levels.behind else _own_filters(ids, sensor, levels)
     noted = noted_conditions(recorded)
-    inversion = _estimated(ids, rows, contact, zone, own_filters, noted).wider(common_uncertainty)
-    filtered = of_roll_off(behind, zone)
+    inversion = _estimated(ids, rows, contact, levels, own_filters, noted).wider(common_uncertainty)
+    filtered = of_roll_off(levels.behind, zone)
     others = findings_of(recorded, measured, level, inversion.campaign_d33, units_checked=campaign.units_checked)
-    at_start = (*at_reading(campaign), *unusual_values, *of_recordings, *_rotated(phase))
+    at_start = (*at_reading(campaign), *unusual_values, *levels.findings, *_rotated(levels.phase))
     findings = (*at_start, *filtered, *inversion.findings, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
@@ -495,7 +533,7 @@ def _estimated(
     ids: tuple[str, ...],
     rows: RecordingD33,
     contact: _Contact,
-    zone: FlatZone,
+    levels: Levels,
     filtered: Mapping[int, Flag],
     noted: NotedConditions,
 ) -> Inversion:
@@ -542,7 +580,7 @@ def _estimated(
         ),
         sensors=sensors,
         flags=tuple(flags),
-        zone=zone,
+        zone=levels.zone,
         campaign_d33=model.mean if model and not of_groups and not at_limit else None,
         spread=model.spread if model and not of_groups and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
@@ -550,6 +588,7 @@ def _estimated(
         left_out=(*far_off, *unfit.values()),
         findings=(*of_groups, *effects.findings(good, sensor, len(ids)), *([of_scatter] if of_scatter else [])),
         declared_percent=float(np.nanmedian(contact.declared_percent[good])),
+        levels=levels,
     )  # fmt: skip
 
 
@@ -577,17 +616,13 @@ def _cells(rows: RecordingD33, good: Indices) -> tuple[Indices, Indices, Indices
 
 
 def array_d33_by_other(
-    campaign: Campaign,
-    table: SigmaTable,
-    band_hz: tuple[float, float] | None,
-    inversion: Inversion,
-    requested: ContactName = "paper",
+    campaign: Campaign, table: SigmaTable, inversion: Inversion, requested: ContactName = "paper"
 ) -> Estimate | None:
     """`absolute_d33` by the other contact model; None where there is none, or it differs by at most 1 %.
 
     Parameters
     ----------
-    campaign, band_hz
+    campaign
         The data of `inversion`, which used the contact model `requested`.
     table
         The σ table, with the contact table in the same folder; raises TableError where that cannot be read.
@@ -596,7 +631,7 @@ def array_d33_by_other(
     if estimate is None:
         return None
     try:
-        other = invert(campaign, contact_model(table, OTHER[requested]), band_hz).absolute_d33
+        other = _inverted(campaign, contact_model(table, OTHER[requested]), inversion.levels).absolute_d33
     except InvalidInput:  # all recordings lie outside its domain
         return None
     return other if other is not None and abs(other.value / estimate.value - 1) > STATED else None
