@@ -16,6 +16,7 @@ A filter counts where it explains the fall and the plateau lies beyond the band:
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from statistics import median
 
@@ -603,10 +604,23 @@ class _Curve:
 
     def fitted(self, filters: Filters) -> tuple[float, float]:
         """χ² of the best plateau and slope behind these filters, and the logarithm of the plateau at `at`."""
-        y, middle = self.y - filters.log_gain(np.exp(self.x)), float(np.average(self.x, weights=self.weight))
-        x, level = self.x - middle, float(np.average(y, weights=self.weight))
-        slope = float(np.clip((self.weight * x * y).sum() / (self.weight * x**2).sum(), -STEEPEST, 0.0))
+        total, middle, x, variance = self._centred
+        y = self.y - filters.log_gain(self._frequency)
+        level = float((y * self.weight).sum() / total)
+        slope = float(np.clip((self.weight * x * y).sum() / variance, -STEEPEST, 0.0))
         return float((self.weight * (y - level - slope * x) ** 2).sum()), level + slope * (self.at - middle)
+
+    @cached_property
+    def _frequency(self) -> Floats:
+        return np.exp(self.x)
+
+    @cached_property
+    def _centred(self) -> tuple[float, float, Floats, float]:
+        """Sum of the weights, weighted mean of `x`, `x` less it, and its weighted sum of squares."""
+        total = float(self.weight.sum())
+        middle = float((self.x * self.weight).sum() / total)
+        x = self.x - middle
+        return total, middle, x, float((self.weight * x**2).sum())
 
     def refined(self, filters: Filters) -> Filters:
         """The filters with the corners that fit best near their own."""
