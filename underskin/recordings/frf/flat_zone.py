@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from statistics import median
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -644,21 +643,28 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
     magnitude over their level, and its relative noise."""
     lines = [stack.frequency[stack.used.any(axis=0)] for stack in stacks]
     edges = edges_over(np.unique(np.concatenate(lines)))
-    cells: list[list[tuple[float, ...]]] = [[] for _ in edges[1:]]  # of recordings: middle, magnitude, scatter, lines
+    cells: list[list[Floats]] = [[] for _ in edges[1:]]  # (recordings, 4): middle, magnitude, scatter, lines
     for stack in stacks:
-        bins = bin_of(stack.frequency, edges)
-        for row, number in enumerate(stack.rows.tolist()):
-            if not (np.isfinite(level[number]) and level[number] != 0):
-                continue
-            size = np.abs(stack.values[row]) / abs(level[number])
-            for bin_index in np.unique(bins[stack.used[row]]).tolist():
-                chosen = stack.used[row] & (bins == bin_index)
-                # Of a few: NumPy's median takes thirty times as long
-                middle_hz, typical = (median(column[chosen].tolist()) for column in (stack.frequency, size))
-                cells[bin_index].append((middle_hz, typical, float(np.std(size[chosen])), int(chosen.sum())))
-    several = [deviation for of_bin in cells for *_, deviation, count in of_bin if count >= _SEVERAL]
-    usual = float(np.median(several)) if several else _USUAL_NOISE
-    filled = [part for of_bin in cells if of_bin and np.median((part := np.array(of_bin).T)[1]) > 0]
+        bins, own_level = bin_of(stack.frequency, edges), level[stack.rows]
+        known = np.isfinite(own_level) & (own_level != 0)
+        size, used = np.abs(stack.values[known]) / np.abs(own_level[known, None]), stack.used[known]
+        for bin_index in np.unique(bins).tolist() if known.any() else ():
+            inside = np.flatnonzero(bins == bin_index)
+            choices, choice_of_row = np.unique(used[:, inside], axis=0, return_inverse=True)  # mostly all lines
+            for number in np.flatnonzero(choices.any(axis=1)).tolist():
+                lines = inside[choices[number]]
+                chosen = size[np.ix_(choice_of_row == number, lines)]
+                columns = (
+                    np.median(stack.frequency[lines]),
+                    np.median(chosen, axis=1),
+                    np.std(chosen, axis=1),
+                    len(lines),
+                )
+                cells[bin_index].append(np.stack(np.broadcast_arrays(*columns), axis=1).astype(np.float64))
+    tables = [np.concatenate(of_bin).T for of_bin in cells if of_bin]
+    several = np.concatenate([scatter[count >= _SEVERAL] for _, _, scatter, count in tables]) if tables else np.zeros(0)
+    usual = float(np.median(several)) if len(several) else _USUAL_NOISE
+    filled = [part for part in tables if np.median(part[1]) > 0]
     middle, magnitude = np.array([np.median(part[:2], axis=1) for part in filled]).reshape(-1, 2).T
     # Of a median over recordings; with few lines their deviation is at least the usual one
     errors = [np.maximum(part[2], np.where(part[3] < _SEVERAL, usual, 0.0)) / np.sqrt(part[3]) for part in filled]
