@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -34,8 +34,12 @@ class Work:
     count: int | None = None
 
 
+@cache
 def sources(*packages: str) -> str:
-    """Digest (`underskin.source_digest`) of packages of this project, or of files in them (`package/pattern`)."""
+    """Digest (`underskin.source_digest`) of packages of this project, or of files in them (`package/pattern`).
+
+    Read once in a process, which goes on with the code that it has loaded.
+    """
     return _digest(_texts(*packages))
 
 
@@ -93,8 +97,9 @@ def reports(work: Work, cases: Sequence[Case], progress: Callable[[int, int], No
     return of_each(work, cases, partial(_report, work.folder / "reports", diagnosing()), progress)
 
 
+@cache
 def of_diagnosis() -> str:
-    """Digest of the library's sources on which a report can depend."""
+    """Digest of the library's sources on which a report can depend; read once, as `sources`."""
     return _digest(of_a_diagnosis(_texts("underskin")))
 
 

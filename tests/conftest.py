@@ -16,6 +16,11 @@ from xdist.scheduler import LoadFileScheduling
 
 from bench import soak
 from tests.support.server import Server, running
+from underskin.parallel import one_blas_thread
+
+# As in commands and in the server's workers: more in each process of a run wait for each other's turn on the cores,
+# which took diagnoses two to five times their processor time. NumPy is not imported yet, here and in those processes.
+one_blas_thread()
 
 # A busy machine is slow and fails no test for it; the examples of a run are those of the next, but in a soak.
 settings.register_profile(

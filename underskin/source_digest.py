@@ -9,7 +9,8 @@ digest.
 
 import ast
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 _IMPORTS = (ast.Import, ast.ImportFrom)
@@ -18,10 +19,38 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 def source_digest(sources: Mapping[str, str]) -> str:
     """SHA-256, in hexadecimal, of the texts of modules by their dotted names."""
-    trees = {name: _without_docstrings(ast.parse(source)) for name, source in sources.items()}
-    first = {name: _digest(tree, dict.fromkeys(trees, "module")) for name, tree in trees.items()}
-    digests = sorted(_digest(tree, first) for tree in trees.values())
+    modules = {name: _Module.of(ast.parse(source)) for name, source in sources.items()}
+    first = {name: module.digest(dict.fromkeys(modules, "module")) for name, module in modules.items()}
+    digests = sorted(module.digest(first) for module in modules.values())
     return hashlib.sha256("\n".join(digests).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class _Module:
+    """A module's imports, and the texts of its other nodes, of a name the name itself and `True`."""
+
+    imports: list[ast.Import | ast.ImportFrom]
+    parts: list[tuple[str, bool]]
+
+    @classmethod
+    def of(cls, tree: ast.Module) -> "_Module":
+        """Of its syntax tree, without docstrings."""
+        imports: list[ast.Import | ast.ImportFrom] = []
+        parts: list[tuple[str, bool]] = []
+        for node in ast.walk(_without_docstrings(tree)):
+            if isinstance(node, _IMPORTS):
+                imports.append(node)
+            elif isinstance(node, ast.Name):
+                parts.append((node.id, True))
+            elif not isinstance(node, ast.alias):
+                parts.append((ast.dump(_bare(node), annotate_fields=False), False))
+        return cls(imports, parts)
+
+    def digest(self, identities: Mapping[str, str]) -> str:
+        """The digest of the module, with identities for the modules that it may import."""
+        meanings = _meanings(self.imports, identities)
+        parts = [meanings.get(part, part) if is_name else part for part, is_name in self.parts]
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:
@@ -29,17 +58,6 @@ def _without_docstrings(tree: ast.Module) -> ast.Module:
         if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:] or [ast.Pass()]
     return tree
-
-
-def _digest(tree: ast.Module, identities: Mapping[str, str]) -> str:
-    """The digest of one module, with identities for the modules that it may import."""
-    meanings = _meanings(tree, identities)
-    parts = [
-        meanings.get(node.id, node.id) if isinstance(node, ast.Name) else ast.dump(_bare(node), annotate_fields=False)
-        for node in ast.walk(tree)
-        if not isinstance(node, (*_IMPORTS, ast.alias))
-    ]
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
 def _bare(node: ast.AST) -> ast.AST:
@@ -56,16 +74,16 @@ def _bare(node: ast.AST) -> ast.AST:
     return type(node)(**fields)
 
 
-def _meanings(tree: ast.Module, identities: Mapping[str, str]) -> dict[str, str]:
+def _meanings(imports: Sequence[ast.Import | ast.ImportFrom], identities: Mapping[str, str]) -> dict[str, str]:
     """The origin of each imported name."""
     local_packages = {name.partition(".")[0] for name in identities}
     meanings = {}
-    for node in ast.walk(tree):
+    for node in imports:
         if isinstance(node, ast.Import):
             for alias in node.names:
                 bound = alias.asname or alias.name.partition(".")[0]
                 meanings[bound] = f"<{identities.get(alias.name, alias.name if alias.asname else bound)}>"
-        elif isinstance(node, ast.ImportFrom):
+        else:
             module = node.module or ""
             for alias in node.names:
                 full_name = f"{module}.{alias.name}"

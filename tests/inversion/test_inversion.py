@@ -17,7 +17,7 @@ from underskin.physics import hertz
 from underskin.recordings.campaign import Campaign, FrfRecording, parse
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
-CAMPAIGNS = 3000 if os.environ.get("UNDERSKIN_SOAK") else 150
+CAMPAIGNS = 3000 if os.environ.get("UNDERSKIN_SOAK") else 100
 
 NEEDS_CAMPAIGNS = pytest.mark.skipif(
     "UNDERSKIN_CAMPAIGNS" not in os.environ, reason="UNDERSKIN_CAMPAIGNS does not name the folder of campaigns"

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import pytest
 
+from proof import stored
+
 
 @pytest.fixture(scope="module")
 def quick_digests() -> Iterator[None]:
@@ -14,6 +16,11 @@ def quick_digests() -> Iterator[None]:
     def quick(sources: Mapping[str, str]) -> str:
         return hashlib.sha256(json.dumps(sources, sort_keys=True).encode()).hexdigest()
 
+    digests = stored.sources, stored.of_diagnosis
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("proof.stored.source_digest", quick)
+        patch.setattr(stored, "source_digest", quick)
+        for digest in digests:
+            digest.cache_clear()
         yield
+    for digest in digests:
+        digest.cache_clear()

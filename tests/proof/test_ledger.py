@@ -83,6 +83,7 @@ def test_grade(verdict: str, named: list[str], rivals: list[list[str]], grade: s
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("quick_digests")
 def test_run_again_changes_nothing_moved_answer(tmp_path: Path) -> None:
     """Run again changes nothing and a moved answer is shown.
 

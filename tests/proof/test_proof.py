@@ -131,15 +131,15 @@ def test_small_run_writes_page_goes_kept(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(own_rig, "SEED", 18)  # its first campaigns are small
     command = typer.Typer()
     command.command()(prove)
-    options = ["--count=2", "--workers=1", *(f"--{name}-dir={tmp_path / name}" for name in ("work", "results", "docs"))]
+    options = ["--count=1", "--workers=1", *(f"--{name}-dir={tmp_path / name}" for name in ("work", "results", "docs"))]
     begun = CliRunner().invoke(command, ["mixture", *options])
     assert begun.exit_code == 0, begun.output
     page = (tmp_path / "docs/proof.md").read_text(encoding="utf-8")
-    assert "2 of 300 campaigns" in page
+    assert "1 of 300 campaigns" in page
     drawings = sorted(file.name for file in (tmp_path / "docs/figures").iterdir())
     assert drawings == ["proof-calibration.svg", "proof-confusion.svg"]
     reports = {file: file.stat().st_mtime_ns for file in (tmp_path / "work/reports").iterdir()}
-    assert len(reports) == 2
+    assert len(reports) == 1
     assert CliRunner().invoke(command, ["mixture", *options]).exit_code == 0
     assert {file: file.stat().st_mtime_ns for file in (tmp_path / "work/reports").iterdir()} == reports
     assert (tmp_path / "docs/proof.md").read_text(encoding="utf-8") == page

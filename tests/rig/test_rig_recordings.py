@@ -154,7 +154,7 @@ def test_line_noise_coherence_described() -> None:
 @pytest.mark.slow
 def test_d33_comes_back_within_stated() -> None:
     """D33 comes back within the stated uncertainty."""
-    runs = 200 if SOAK else 12
+    runs = 200 if SOAK else 8
     table = underskin.load_table()
     inside, off = np.array([covered(number, table) for number in range(runs)]).T
     assert inside.sum() >= (0.95 * runs if SOAK else binom.ppf(0.001, runs, 0.95))

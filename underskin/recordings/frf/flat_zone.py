@@ -16,8 +16,8 @@ A filter counts where it explains the fall and the plateau lies beyond the band:
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
-from statistics import median
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -603,10 +603,23 @@ class _Curve:
 
     def fitted(self, filters: Filters) -> tuple[float, float]:
         """χ² of the best plateau and slope behind these filters, and the logarithm of the plateau at `at`."""
-        y, middle = self.y - filters.log_gain(np.exp(self.x)), float(np.average(self.x, weights=self.weight))
-        x, level = self.x - middle, float(np.average(y, weights=self.weight))
-        slope = float(np.clip((self.weight * x * y).sum() / (self.weight * x**2).sum(), -STEEPEST, 0.0))
+        total, middle, x, variance = self._centred
+        y = self.y - filters.log_gain(self._frequency)
+        level = float((y * self.weight).sum() / total)
+        slope = float(np.clip((self.weight * x * y).sum() / variance, -STEEPEST, 0.0))
         return float((self.weight * (y - level - slope * x) ** 2).sum()), level + slope * (self.at - middle)
+
+    @cached_property
+    def _frequency(self) -> Floats:
+        return np.exp(self.x)
+
+    @cached_property
+    def _centred(self) -> tuple[float, float, Floats, float]:
+        """Sum of the weights, weighted mean of `x`, `x` less it, and its weighted sum of squares."""
+        total = float(self.weight.sum())
+        middle = float((self.x * self.weight).sum() / total)
+        x = self.x - middle
+        return total, middle, x, float((self.weight * x**2).sum())
 
     def refined(self, filters: Filters) -> Filters:
         """The filters with the corners that fit best near their own."""
@@ -630,21 +643,28 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
     magnitude over their level, and its relative noise."""
     lines = [stack.frequency[stack.used.any(axis=0)] for stack in stacks]
     edges = edges_over(np.unique(np.concatenate(lines)))
-    cells: list[list[tuple[float, ...]]] = [[] for _ in edges[1:]]  # of recordings: middle, magnitude, scatter, lines
+    cells: list[list[Floats]] = [[] for _ in edges[1:]]  # (recordings, 4): middle, magnitude, scatter, lines
     for stack in stacks:
-        bins = bin_of(stack.frequency, edges)
-        for row, number in enumerate(stack.rows.tolist()):
-            if not (np.isfinite(level[number]) and level[number] != 0):
-                continue
-            size = np.abs(stack.values[row]) / abs(level[number])
-            for bin_index in np.unique(bins[stack.used[row]]).tolist():
-                chosen = stack.used[row] & (bins == bin_index)
-                # Of a few: NumPy's median takes thirty times as long
-                middle_hz, typical = (median(column[chosen].tolist()) for column in (stack.frequency, size))
-                cells[bin_index].append((middle_hz, typical, float(np.std(size[chosen])), int(chosen.sum())))
-    several = [deviation for of_bin in cells for *_, deviation, count in of_bin if count >= _SEVERAL]
-    usual = float(np.median(several)) if several else _USUAL_NOISE
-    filled = [part for of_bin in cells if of_bin and np.median((part := np.array(of_bin).T)[1]) > 0]
+        bins, own_level = bin_of(stack.frequency, edges), level[stack.rows]
+        known = np.isfinite(own_level) & (own_level != 0)
+        size, used = np.abs(stack.values[known]) / np.abs(own_level[known, None]), stack.used[known]
+        for bin_index in np.unique(bins).tolist() if known.any() else ():
+            inside = np.flatnonzero(bins == bin_index)
+            choices, choice_of_row = np.unique(used[:, inside], axis=0, return_inverse=True)  # mostly all lines
+            for number in np.flatnonzero(choices.any(axis=1)).tolist():
+                lines = inside[choices[number]]
+                chosen = size[np.ix_(choice_of_row == number, lines)]
+                columns = (
+                    np.median(stack.frequency[lines]),
+                    np.median(chosen, axis=1),
+                    np.std(chosen, axis=1),
+                    len(lines),
+                )
+                cells[bin_index].append(np.stack(np.broadcast_arrays(*columns), axis=1).astype(np.float64))
+    tables = [np.concatenate(of_bin).T for of_bin in cells if of_bin]
+    several = np.concatenate([scatter[count >= _SEVERAL] for _, _, scatter, count in tables]) if tables else np.zeros(0)
+    usual = float(np.median(several)) if len(several) else _USUAL_NOISE
+    filled = [part for part in tables if np.median(part[1]) > 0]
     middle, magnitude = np.array([np.median(part[:2], axis=1) for part in filled]).reshape(-1, 2).T
     # Of a median over recordings; with few lines their deviation is at least the usual one
     errors = [np.maximum(part[2], np.where(part[3] < _SEVERAL, usual, 0.0)) / np.sqrt(part[3]) for part in filled]
