@@ -21,7 +21,7 @@ from scipy.special import log_ndtr
 
 from underskin.diagnosis.inference.fit import Fitter, Scatter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Likelihoods, Points, cell_response
+from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Points, Tangent, cell_response
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
 from underskin.mechanisms.models.frf import FrfModel
@@ -72,9 +72,9 @@ class Evidence:
         return self.fitter.evaluate(self.fitter.at(self.point))
 
     @cached_property
-    def marginal(self) -> Likelihoods:
-        """The likelihood there."""
-        return self.fitter.marginal(self.at)
+    def tangent(self) -> Tangent:
+        """The likelihood linearised there."""
+        return self.fitter.tangent(self.at.points, self.at.products)
 
     @cached_property
     def prediction(self) -> Prediction:
@@ -103,7 +103,7 @@ class Evidence:
     @property
     def sensor_gains(self) -> Floats:
         """The most probable log gain of each sensor (sensors,)."""
-        return self.marginal.sensor_gains[0]
+        return self.tangent.sensor_gains[0]
 
     @property
     def pickup_variance(self) -> Floats:

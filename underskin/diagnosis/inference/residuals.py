@@ -25,8 +25,7 @@ from underskin.diagnosis.inference.evidence import (
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, parameter_slices
-from underskin.diagnosis.inference.products import CurveProducts
+from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Points, parameter_slices
 from underskin.errors import InvalidInput
 from underskin.halton import halton
 from underskin.mechanisms.base import Normal, Unsupported
@@ -103,13 +102,8 @@ def information(explanation: Explanation, rows: Floats, noise: Explanation | Non
     """Jᵀ C⁻¹ J of changes of the force J (changes, samples), under the noise of the explanation or of another one."""
     fitter = Fitter(explanation.best.hypothesis)
     covariance = (noise or explanation).point.covariance
-    at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)))
-    levels = fitter.levels(at.points.covariance[:, None])
-    assert isinstance(at.products, CurveProducts)
-    along, square = at.products.with_force_changes(rows, levels)
-    likelihood = Likelihoods(fitter.lines, fitter.curvature, at.products, levels, at.points.sensor_log_gain)
-    level2 = float(levels.level.flat[0]) ** 2
-    return np.asarray(likelihood.information(along[None] / level2, square[None] / level2)[0])
+    at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)), slopes=False)
+    return fitter.tangent(at.points, at.products).information_on_forces(rows)
 
 
 def information_beyond(full: Floats, indices: Indices, precision: Floats) -> Floats:

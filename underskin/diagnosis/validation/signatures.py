@@ -25,7 +25,6 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import EXPLAINED, RIVAL_SHARE
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
-from underskin.diagnosis.inference.hypothesis import Likelihoods
 from underskin.diagnosis.noise import TYPICAL, NoiseLevels, SeveralLevels
 from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.selection.priors import least_evidence, log_prior
@@ -114,11 +113,8 @@ class Signatures:
             for value in (levels.gain, levels.level, levels.position, levels.spread, levels.smooth)
         )
         several = SeveralLevels(gain, level, position, spread, None, smooth)
-        likelihood = Likelihoods(
-            fitter.lines, self._problem.curvature, base.products, several, base.points.sensor_log_gain
-        )
         along, square = self._products(levels.smooth if fitter.lines.curves else 0.0)
-        return likelihood.information(along / levels.level**2, square / levels.level**2)[0]
+        return fitter.tangent(base.points, base.products, several).information(along, square)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +163,7 @@ class _Rows:
         return along - self.base, across
 
     def products(self, parts: Sequence[Split]) -> tuple[Floats, Floats]:
-        """Re u*J (1, recordings, P) and Re JᵀJ (1, P, P) of split columns J."""
+        """Re u*J (1, P, recordings) and Re JᵀJ (1, P, P) of split columns J."""
         along = np.array([part for part, _ in parts])
         square = along @ along.T
         with_across = [index for index, (_, component) in enumerate(parts) if component is not None]
@@ -176,7 +172,7 @@ class _Rows:
             for first in range(0, len(across[0]), _BLOCK_NUMBERS):
                 block = np.array([component[first : first + _BLOCK_NUMBERS] for component in across], dtype=float)
                 square[np.ix_(with_across, with_across)] += block @ block.T
-        return (along * self._size).T[None], square[None]
+        return (along * self._size)[None], square[None]
 
     def _whitened(self, rows: Floats) -> Floats:
         """Real rows scaled so that their errors are independent with variance 1."""
