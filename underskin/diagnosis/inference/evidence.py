@@ -49,6 +49,11 @@ class Evidence:
     covariance: Floats  # (mean parameters, mean parameters), of the quadratic, bounds not counted
     mean: Floats  # (mean parameters,), of the quadratic, which may lie outside the bounds
 
+    def covariance_of(self, indices: Sequence[int]) -> Floats:
+        """The covariance of parameters of the model's mean (indices, indices), in fit coordinates."""
+        rows = [self.hypothesis.mean_indices.index(index) for index in indices]
+        return self.covariance[np.ix_(rows, rows)]
+
     def log_density_at_end(self, index: int) -> float:
         """The logarithm of the posterior density of a parameter at its upper bound over that of its prior: the evidence
         with the parameter held there over that with it free (Dickey, Ann. Math. Stat. 42 (1971) 204)."""

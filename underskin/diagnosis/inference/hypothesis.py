@@ -369,10 +369,18 @@ class Hypothesis:
         return np.array(rows).T
 
     @cached_property
+    def spans(self) -> dict[str, slice]:
+        """The slice of the model's parameters that belongs to each mechanism."""
+        return parameter_slices(self.model.names, self.lines)
+
+    def index(self, name: str) -> int:
+        """The index of one of the model's parameters."""
+        return [parameter.name for parameter in self.model.parameters].index(name)
+
+    @property
     def mechanism_parameter_count(self) -> int:
         """The number of parameters that belong to mechanisms; they come first."""
-        mechanisms = [self.lines.mechanisms[name] for name in self.model.names]
-        return sum(map(len, parameters_together(mechanisms, self.lines.campaign, self.lines.kind).values()))
+        return max((span.stop for span in self.spans.values()), default=0)
 
     @cached_property
     def _curve_lines(self) -> CurveLines:

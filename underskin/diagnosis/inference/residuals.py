@@ -25,7 +25,7 @@ from underskin.diagnosis.inference.evidence import (
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Points, parameter_slices
+from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Points
 from underskin.errors import InvalidInput
 from underskin.halton import halton
 from underskin.mechanisms.base import Normal, Unsupported
@@ -140,7 +140,7 @@ def with_hidden_mechanism(
         hypothesis = problem.hypothesis(names, best.hypothesis.has_position_scatter)
     except (Unsupported, InvalidInput):
         return None
-    slices = parameter_slices(names, hypothesis.lines)
+    slices = hypothesis.spans
     new = range(slices[name].start, slices[name].stop)
     if any(
         len(explanation.coordinates(mechanism)) != slices[mechanism].stop - slices[mechanism].start
@@ -164,7 +164,7 @@ def with_hidden_mechanism(
     reference = mean_integrals(best.fitter, best.at)[0] + level_integrals(best.fitter, best.at)
     gained = log_evidence - reference
     shares = np.exp(np.minimum(gained, gained - gained.max() + _MOST)) / len(fit)
-    index = [parameter.name for parameter in hypothesis.model.parameters].index(parameter_name)
+    index = hypothesis.index(parameter_name)
     spread = marginalise_sensor_spread(held, at, index)
     if spread is not None:
         return NormalMixture.joined(
@@ -203,15 +203,13 @@ def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:
     """
     skin = problem.lines.campaign.skin
     off = skin.tolerances or Tolerances()
-    best = explanation.best
-    indices = {parameter.name: index for index, parameter in enumerate(explanation.model.parameters)}
-    rows = {name: best.hypothesis.mean_indices.index(indices[name]) for name in ("d33", "youngs_modulus", "thickness")}
     variance = (_by_sensor_radius(problem) * off.sensor_radius_percent / 100) ** 2
     percents = {"youngs_modulus": off.youngs_modulus_percent, "thickness": off.thickness_percent}
     for name, percent in percents.items():
-        prior = explanation.model.parameters[indices[name]].prior
+        index = explanation.index(name)
+        prior = explanation.model.parameters[index].prior
         assert isinstance(prior, Normal)
-        moved = float(best.covariance[rows["d33"], rows[name]]) / prior.sd**2
+        moved = float(explanation.best.covariance_of([explanation.index("d33"), index])[0, 1]) / prior.sd**2
         variance += moved**2 * max((percent / 100) ** 2 - prior.sd**2, 0.0)
     return float(np.sqrt(variance))
 

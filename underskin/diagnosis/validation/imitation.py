@@ -17,7 +17,6 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.inference.residuals import force_and_slopes, information, information_beyond, precision_of
 from underskin.diagnosis.selection.priors import PRIORS, guess_count, least_evidence, log_prior
 from underskin.diagnosis.validation.signatures import least_chi2
@@ -57,7 +56,7 @@ def odds_of_imitated_laws(explanation: Explanation, null: Explanation, supported
     strength = beyond_nuisances[-1] / beyond_nuisances[:-1][visible]
     least = least_chi2(supported, least_evidence(explanation))
     imitated = strength * _chi2_beyond(joint, indices, precision)[:-1][visible] < least
-    for span in parameter_slices(explanation.names, hypothesis.lines).values():
+    for span in explanation.spans.values():
         imitated &= strength * _chi2_beyond(joint, np.delete(indices, span), precision)[:-1][visible] > least
     return _odds(int(imitated.sum()), int(visible.sum()), guess_count(explanation), supported)
 
