@@ -3,7 +3,7 @@
 - The residual of a recording is its relative deviation from the model; that of a line its deviation from its
   recording's best real multiple of the model. The lines of a recording share one gain error, so level and shape are
   kept apart.
-- Changes of the force of curves: their χ² after projection on the fitted parameters.
+- Changes of the prediction: what the fitted parameters absorb of them, and the χ² beyond that.
 - A mechanism may be present without being visible: a glue line that slips by the same share under every sphere only
   changes d33. The posterior of a parameter with that mechanism added is a mixture over values spread evenly over its
   prior, at each of which everything else is fitted again, each weighted by its evidence. Where the sensors' spread is
@@ -12,6 +12,7 @@
 """
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from underskin.diagnosis.inference.evidence import (
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Points
+from underskin.diagnosis.inference.hypothesis import Evaluated, Points
 from underskin.errors import InvalidInput
 from underskin.halton import halton
 from underskin.mechanisms.base import Normal, Unsupported
@@ -93,29 +94,46 @@ def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
     return force, slopes, -slopes[model.contact_points].sum(axis=0)
 
 
-def precision_of(hypothesis: Hypothesis) -> Floats:
-    """Precisions of the parameters' priors (parameters,)."""
-    return np.asarray(hypothesis.priors[0] + (FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
+@dataclass(frozen=True)
+class Linearised:
+    """What parameters of a fit and further changes of its prediction would tell, to first order: `information` JᵀC⁻¹J
+    on both, the parameters first, and the `precision` of the parameters' priors (parameters,)."""
 
+    information: Floats
+    precision: Floats
 
-def information(explanation: Explanation, rows: Floats, noise: Explanation | None = None) -> Floats:
-    """Jᵀ C⁻¹ J of changes of the force J (changes, samples), under the noise of the explanation or of another one."""
-    fitter = Fitter(explanation.best.hypothesis)
-    covariance = (noise or explanation).point.covariance
-    at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)), slopes=False)
-    return fitter.tangent(at.points, at.products).information_on_forces(rows)
+    @classmethod
+    def of_forces(
+        cls, explanation: Explanation, slopes: Floats, changes: Floats, noise: Explanation | None = None
+    ) -> Self:
+        """Of changes of the force of curves (changes, samples) beside its derivatives, the `slopes` (parameters,
+        samples), under the noise of the explanation or of another one."""
+        hypothesis = explanation.best.hypothesis
+        fitter, covariance = Fitter(hypothesis), (noise or explanation).point.covariance
+        at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)), slopes=False)
+        information = fitter.tangent(at.points, at.products).information_on_forces(np.concatenate([slopes, changes]))
+        return cls(information, hypothesis.priors[0] + (FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
 
+    @property
+    def of_changes(self) -> Floats:
+        """The information on the changes (changes, changes)."""
+        return self.information[len(self.precision) :, len(self.precision) :]
 
-def information_beyond(full: Floats, indices: Indices, precision: Floats) -> Floats:
-    """Information (changes, changes) on the changes after projection on the parameters.
+    def absorbed(self, indices: Indices | slice = slice(None)) -> Floats:
+        """How far each change shifts the parameters at these indices, all others held (indices, changes)."""
+        count = len(self.precision)
+        rows = np.arange(count)[indices]
+        block = self.information[np.ix_(rows, rows)] + np.diag(self.precision[rows])
+        return np.asarray(np.linalg.solve(block, self.information[rows, count:]), dtype=float)
 
-    `full` is the `information` on parameters and further changes, `indices` those of the parameters to project on,
-    `precision` that of all parameters (parameters,).
-    """
-    first = len(precision)
-    block = full[np.ix_(indices, indices)] + np.diag(precision[indices])
-    shared = full[first:, indices]
-    return np.asarray(full[first:, first:] - shared @ np.linalg.solve(block, shared.T))
+    def beyond(self, indices: Indices | slice = slice(None)) -> Floats:
+        """The information on the changes that the parameters at these indices leave (changes, changes)."""
+        shared = self.information[len(self.precision) :, : len(self.precision)][:, indices]
+        return np.asarray(self.of_changes - shared @ self.absorbed(indices))
+
+    def chi2(self, indices: Indices | slice = slice(None)) -> Floats:
+        """χ² by which each change would show beyond the parameters at these indices (changes,)."""
+        return np.diag(self.beyond(indices))
 
 
 _NODES = {0: 1, 1: 12, 2: 24}  # by number of parameters
