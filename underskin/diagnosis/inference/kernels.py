@@ -1,6 +1,6 @@
 """Compiled parts of the fit (see `hypothesis` for the model of the noise): likelihood, sums of curves and priors.
 
-Arrays are (points, sets, recordings); an axis of length 1 stands for all. The inverse of the covariance is applied by
+Arrays are (points, sets, recordings); one set of sums may stand for all. The inverse of the covariance is applied by
 Sherman and Morrison's identity, first for each recording, with its direction u, then for the sensors' columns.
 """
 
@@ -12,61 +12,6 @@ from underskin.units import Floats, Mask
 
 _TOGETHER = 8  # factors of a determinant that share one logarithm: below 1e38 each, they do not overflow
 _NONE = 1e-300  # u*u where u is 0
-
-
-@compiled()
-def log_likelihood(
-    level: Floats,
-    uu: Floats,
-    uy: Floats,
-    across: Floats,
-    squared_slopes: Floats,
-    sensor: NDArray[np.int64],
-    sensor_log_gain: Floats,
-    laplacian: Floats,
-    square: Floats,
-    noise: Floats,
-    mm: Floats,
-    mr: Floats,
-) -> float:
-    """Of one point and set, see `log_likelihoods`; `mm` and `mr` (sensors,) are overwritten.
-
-    With V = s'² a² + p² |t|² a recording's χ² is |y|² − (Re u*y)²/u*u, the part of y `across` u, and
-    (Re u*r)²/((1 + V u*u) u*u), the square completed along u: |r|² minus what V takes out would cancel to rounding
-    error where a model predicts far more than was measured.
-    """
-    gain2, k2, p2, tau2 = noise[0] ** 2, noise[1] ** 2, noise[2] ** 2, noise[3] ** 2
-    mm[:], mr[:] = 0.0, 0.0
-    chi2 = log_determinant = 0.0
-    determinant, inverse = 1.0, 1 / k2
-    for recording in range(len(level)):
-        sensor_index = sensor[recording]
-        log_gain = sensor_log_gain[sensor_index]
-        exponent = log_gain + 0.5 * p2 * laplacian[recording]
-        factor = np.exp(exponent) if exponent != 0 else 1.0
-        a = level[recording] * factor
-        mean = a * (1 - log_gain)
-        u_r = (uy[recording] - mean * uu[recording]) * inverse
-        u = max(uu[recording] * inverse, _NONE)
-        a2 = a * a
-        variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a2
-        if len(squared_slopes):
-            variance += p2 * squared_slopes[recording] * factor * factor
-        inflation = 1 + variance * u
-        scale = 1 / (inflation * u)
-        reduced = scale * u
-        chi2 += across[recording] * inverse + u_r * u_r * scale
-        mm[sensor_index] += a2 * u * reduced
-        mr[sensor_index] += a * u_r * reduced
-        determinant *= inflation
-        if recording % _TOGETHER == 0:
-            log_determinant += np.log(determinant)
-            determinant = 1.0
-    log_determinant += np.log(determinant)
-    for sensor_index in range(len(mm)):
-        chi2 -= tau2 / (1 + tau2 * mm[sensor_index]) * mr[sensor_index] ** 2
-        log_determinant += np.log1p(tau2 * mm[sensor_index])
-    return -0.5 * (chi2 + log_determinant)
 
 
 @compiled(
@@ -88,6 +33,10 @@ def log_likelihoods(
 ) -> None:
     """Add −½ of the terms of χ² and log|C| that depend on the noise levels to `totals` (points, sets).
 
+    With V = s'² a² + p² |t|² a recording's χ² is |y|² − (Re u*y)²/u*u, the part of y `across` u, and
+    (Re u*r)²/((1 + V u*u) u*u), the square completed along u: |r|² minus what V takes out would cancel to rounding
+    error where a model predicts far more than was measured.
+
     Parameters
     ----------
     level
@@ -105,23 +54,41 @@ def log_likelihoods(
     noise
         (points, sets, 4): gain, level, position and spread.
     """
+    points, sets = totals.shape
     mm, mr = np.empty(sensor_log_gain.shape[1]), np.empty(sensor_log_gain.shape[1])
-    for point in range(totals.shape[0]):
-        for number in range(totals.shape[1]):
-            totals[point, number] += log_likelihood(
-                level[point],
-                uu[min(point, uu.shape[0] - 1), min(number, uu.shape[1] - 1)],
-                uy[min(point, uy.shape[0] - 1), min(number, uy.shape[1] - 1)],
-                across[min(point, across.shape[0] - 1), min(number, across.shape[1] - 1)],
-                squared_slopes[point],
-                sensor,
-                sensor_log_gain[point],
-                laplacian,
-                square,
-                noise[min(point, len(noise) - 1), number],
-                mm,
-                mr,
-            )
+    for point in range(points):
+        for number in range(sets):
+            gain2, k2, p2, tau2 = noise[point, number] ** 2
+            at = min(number, uu.shape[1] - 1)
+            mm[:], mr[:] = 0.0, 0.0
+            chi2 = log_determinant = 0.0
+            determinant, inverse = 1.0, 1 / k2
+            for recording in range(len(sensor)):
+                sensor_index = sensor[recording]
+                log_gain = sensor_log_gain[point, sensor_index]
+                exponent = log_gain + 0.5 * p2 * laplacian[recording]
+                factor = np.exp(exponent) if exponent != 0 else 1.0
+                a = level[point, recording] * factor
+                u_u = uu[point, at, recording]
+                u_r = (uy[point, at, recording] - a * (1 - log_gain) * u_u) * inverse
+                u = max(u_u * inverse, _NONE)
+                variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a * a
+                if squared_slopes.shape[1]:
+                    variance += p2 * squared_slopes[point, recording] * factor * factor
+                inflation = 1 + variance * u
+                scale = 1 / (inflation * u)
+                chi2 += across[point, at, recording] * inverse + u_r * u_r * scale
+                mm[sensor_index] += a * a * u * u * scale
+                mr[sensor_index] += a * u_r * u * scale
+                determinant *= inflation
+                if recording % _TOGETHER == 0:
+                    log_determinant += np.log(determinant)
+                    determinant = 1.0
+            log_determinant += np.log(determinant)
+            for sensor_index in range(len(mm)):
+                chi2 -= tau2 / (1 + tau2 * mm[sensor_index]) * mr[sensor_index] ** 2
+                log_determinant += np.log1p(tau2 * mm[sensor_index])
+            totals[point, number] -= 0.5 * (chi2 + log_determinant)
 
 
 @compiled()
