@@ -75,8 +75,8 @@ class AtPoints:
 
 
 @cache
-def _names_by_points(kind: type[AtPoints]) -> list[str]:
-    return [field.name for field in fields(kind) if field.name not in kind.shared]
+def _names_by_points(arrays: type[AtPoints]) -> list[str]:
+    return [field.name for field in fields(arrays) if field.name not in arrays.shared]
 
 
 @dataclass(frozen=True)
