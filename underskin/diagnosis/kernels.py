@@ -50,7 +50,7 @@ def roughness_cost(
     return total + np.log(of_v) + power * np.log(of_u)
 
 
-_THREE, _FOUR = "float64[:, :, ::1]", "float64[:, :, :, ::1]"
+_THREE = "float64[:, :, ::1]"
 
 
 @compiled(f"void(complex128[:, :, ::1], {_THREE}, {_THREE}, {_THREE})")
@@ -82,42 +82,8 @@ def line_products(values: Array, products: Floats, real: Floats, imag: Floats) -
                 pair += 1
 
 
-@compiled(f"void({_THREE}, {_THREE}, int64[::1], {_THREE}, {_THREE}, {_FOUR})")
-def spread_sums(both: Floats, with_y: Floats, moving: NDArray[np.int64], uv: Floats, vy: Floats, vv: Floats) -> None:
-    """Place the sums with derivatives at the indices of their parameters.
-
-    Parameters
-    ----------
-    both
-        (points, pairs, recordings) of u and its derivatives, the pairs in the order of the upper triangle.
-    with_y
-        (points, 1 + derivatives, recordings) of each with the measured values.
-    moving
-        (derivatives,) the parameters that they are by.
-    uv, vy, vv
-        (points, recordings, parameters), twice, and (points, recordings, parameters, parameters), of which the elements
-        that differ from 0 are filled.
-    """
-    points, _, recordings = both.shape
-    count = len(moving)
-    for point in range(points):
-        for first in range(count):
-            p = moving[first]
-            for recording in range(recordings):
-                uv[point, recording, p] = both[point, 1 + first, recording]
-                vy[point, recording, p] = with_y[point, 1 + first, recording]
-        pair = 1 + count
-        for first in range(count):
-            for second in range(first, count):
-                p, q = moving[first], moving[second]
-                for recording in range(recordings):
-                    vv[point, recording, p, q] = vv[point, recording, q, p] = both[point, pair, recording]
-                pair += 1
-
-
 _ROWS_TOGETHER = 8  # factors of the determinant that share one logarithm: below 1e38 each, they do not overflow
 _NONE = 1e-17  # of x: smaller losses are below the sum's rounding
-_SUMS = "float64[:, :, ::1]"
 _ROWS = "int64[::1], float64[::1], int64[::1], complex128[::1], int64[::1]"
 
 
@@ -131,7 +97,7 @@ def _subtract_losses(losses: Floats, uu: Floats, uy: Floats, yy: Floats, point: 
     losses[:] = 0.0
 
 
-@compiled(f"void(float64[:, :, ::1], {_ROWS}, complex128[:, ::1], {_SUMS}, {_SUMS}, {_SUMS}, float64[:, ::1])")
+@compiled(f"void({_THREE}, {_ROWS}, complex128[:, ::1], {_THREE}, {_THREE}, {_THREE}, float64[:, ::1])")
 def subtract_pickup(
     pickup: Floats,
     alike: NDArray[np.int64],
@@ -191,60 +157,6 @@ def subtract_pickup(
         _subtract_losses(losses, uu, uy, yy, point, current_recording)
         for number in range(sets):
             log_determinant[point, number] += 2 * (total[number] + np.log(factors[number]))
-
-
-@compiled(
-    f"void(float64[:, ::1], {_ROWS}, complex128[:, ::1], complex128[:, :, ::1], {_SUMS}, {_SUMS}, "
-    "float64[:, :, :, ::1])"
-)
-def subtract_pickup_slopes(
-    pickup: Floats,
-    alike: NDArray[np.int64],
-    precision: Floats,
-    recording: NDArray[np.int64],
-    y: Complexes,
-    line: NDArray[np.int64],
-    u: Array,
-    v: Array,
-    uv: Floats,
-    vy: Floats,
-    vv: Floats,
-) -> None:
-    """Subtract the rows' losses from `uv`, `vy` (points, recordings, P) and `vv` (points, recordings, P, P).
-
-    Parameters
-    ----------
-    pickup
-        (q/κ)² (points, distinct).
-    alike, precision, recording, y, line
-        See `subtract_pickup`.
-    u, v
-        The direction (points, lines), and its derivatives (points, P, lines).
-    """
-    points, count, lines = v.shape
-    moving = np.empty(count, dtype=np.int64)
-    for point in range(points):
-        moves = 0
-        for p in range(count):
-            for at in range(lines):
-                if v[point, p, at] != 0:
-                    moving[moves] = p
-                    moves += 1
-                    break
-        for row in range(len(y)):
-            x = pickup[point, alike[row]] * precision[row]
-            if x > _NONE and moves:
-                loss, recording_index, at = x / (1 + x) * precision[row], recording[row], line[row]
-                direction, measured = u[point, at], y[row]
-                for first in range(moves):
-                    p = moving[first]
-                    of_p = v[point, p, at]
-                    uv[point, recording_index, p] -= loss * (direction.real * of_p.real + direction.imag * of_p.imag)
-                    vy[point, recording_index, p] -= loss * (measured.real * of_p.real + measured.imag * of_p.imag)
-                    for second in range(moves):
-                        q = moving[second]
-                        of_q = v[point, q, at]
-                        vv[point, recording_index, p, q] -= loss * (of_p.real * of_q.real + of_p.imag * of_q.imag)
 
 
 @compiled("void(float64[:, :, ::1], float64[:, ::1], float64[::1])")

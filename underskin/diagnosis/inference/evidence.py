@@ -21,7 +21,7 @@ from scipy.special import log_ndtr
 
 from underskin.diagnosis.inference.fit import Fitter, Scatter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Likelihoods, Points, cell_response
+from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Points, Tangent, cell_response
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
 from underskin.mechanisms.models.frf import FrfModel
@@ -49,6 +49,11 @@ class Evidence:
     covariance: Floats  # (mean parameters, mean parameters), of the quadratic, bounds not counted
     mean: Floats  # (mean parameters,), of the quadratic, which may lie outside the bounds
 
+    def covariance_of(self, indices: Sequence[int]) -> Floats:
+        """The covariance of parameters of the model's mean (indices, indices), in fit coordinates."""
+        rows = [self.hypothesis.mean_indices.index(index) for index in indices]
+        return self.covariance[np.ix_(rows, rows)]
+
     def log_density_at_end(self, index: int) -> float:
         """The logarithm of the posterior density of a parameter at its upper bound over that of its prior: the evidence
         with the parameter held there over that with it free (Dickey, Ann. Math. Stat. 42 (1971) 204)."""
@@ -72,9 +77,9 @@ class Evidence:
         return self.fitter.evaluate(self.fitter.at(self.point))
 
     @cached_property
-    def marginal(self) -> Likelihoods:
-        """The likelihood there."""
-        return self.fitter.marginal(self.at)
+    def tangent(self) -> Tangent:
+        """The likelihood linearised there."""
+        return self.fitter.tangent(self.at.points, self.at.products)
 
     @cached_property
     def prediction(self) -> Prediction:
@@ -103,7 +108,7 @@ class Evidence:
     @property
     def sensor_gains(self) -> Floats:
         """The most probable log gain of each sensor (sensors,)."""
-        return self.marginal.sensor_gains[0]
+        return self.tangent.sensor_gains[0]
 
     @property
     def pickup_variance(self) -> Floats:

@@ -26,7 +26,6 @@ from underskin.diagnosis.inference.hypothesis import (
     Hypothesis,
     Points,
     curvature,
-    parameter_slices,
 )
 from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, Plateau
@@ -74,7 +73,7 @@ class _Grid:
     """
 
     def __init__(self, hypothesis: Hypothesis, explained: "Explanation | None") -> None:
-        slices = parameter_slices(hypothesis.model.names, hypothesis.lines)
+        slices = hypothesis.spans
         known = {} if explained is None else {name: explained.coordinates(name) for name in explained.names}
         parent = {name: known[name] for name in slices if name in known}
         # A mechanism also counts as new if its parameters differ from those in the parent.
@@ -242,7 +241,16 @@ class Explanation:
 
     def coordinates(self, name: str) -> list[float]:
         """The most probable fit coordinates of one of its mechanisms."""
-        return list(self.point.fit[parameter_slices(self.names, self.best.hypothesis.lines)[name]])
+        return list(self.point.fit[self.spans[name]])
+
+    @property
+    def spans(self) -> dict[str, slice]:
+        """The slice of the parameters that belongs to each mechanism."""
+        return self.best.hypothesis.spans
+
+    def index(self, name: str) -> int:
+        """The index of a parameter."""
+        return self.best.hypothesis.index(name)
 
 
 @dataclass(frozen=True)

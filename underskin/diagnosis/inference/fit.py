@@ -19,10 +19,9 @@ from underskin.diagnosis.inference.hypothesis import (
     Evaluated,
     FitPoint,
     Hypothesis,
-    Likelihoods,
     Points,
+    Tangent,
     log_likelihoods,
-    normal_equations,
 )
 from underskin.diagnosis.inference.least_squares import LeastSquares, between_samples
 from underskin.diagnosis.inference.products import FrfProducts, Products
@@ -137,9 +136,8 @@ class Fitter:
         gains."""
         if self._spread is not None:
             for _ in range(_GAIN_ROUNDS):
-                levels = self.levels(points.covariance[:, None])
-                gains = Likelihoods(self.lines, self.curvature, products, levels, points.sensor_log_gain).sensor_gains
-                free = levels.spread[:, 0] >= _FREE_SPREAD
+                gains = self.tangent(points, products).sensor_gains
+                free = self.levels(points.covariance).spread >= _FREE_SPREAD
                 sensor_log_gain = np.where(
                     free, np.clip(gains, -_LARGEST_SENSOR_LOG_GAIN, _LARGEST_SENSOR_LOG_GAIN), points.sensor_log_gain
                 )
@@ -149,10 +147,10 @@ class Fitter:
                 points = replace(points, sensor_log_gain=sensor_log_gain)
         return Evaluated(points, products, self._costs(points, products, points.covariance[:, None])[:, 0])
 
-    def marginal(self, at: Evaluated) -> Likelihoods:
-        """The terms of the likelihood at points."""
-        levels = self.levels(at.points.covariance[:, None])
-        return Likelihoods(self.lines, self.curvature, at.products, levels, at.points.sensor_log_gain)
+    def tangent(self, points: Points, products: Products, levels: SeveralLevels | None = None) -> Tangent:
+        """The likelihood linearised at points with known predictions, under their noise levels or others."""
+        levels = self.levels(points.covariance[:, None]) if levels is None else levels
+        return Tangent(self.lines, self.curvature, products, levels, points.sensor_log_gain)
 
     def levels(self, covariance: Floats) -> SeveralLevels:
         """The noise levels (…, 1) of covariance parameters (…, parameters)."""
@@ -200,8 +198,7 @@ class Fitter:
 
         Held parameters have gradient 0 and information 1.
         """
-        levels, sensor_log_gain = self.levels(at.points.covariance[:, None]), at.points.sensor_log_gain
-        information, gradient = normal_equations(self.lines, self.curvature, at.products, levels, sensor_log_gain)
+        information, gradient = self.tangent(at.points, at.products).normal_equations
         offset = at.points.fit - self._centre
         precision = self._prior_precision(offset)
         others = self.hypothesis.other_kinds

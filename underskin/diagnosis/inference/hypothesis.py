@@ -30,6 +30,7 @@ from underskin.diagnosis.inference.products import (
     FrfLines,
     PickupRows,
     Products,
+    SlopeSums,
     frf_lines,
     pickup_rows,
 )
@@ -83,107 +84,123 @@ def log_likelihoods(
     return log_likelihood
 
 
-def normal_equations(
-    lines: Lines,
-    curvature: Curvature,
-    products: Products,
-    levels: SeveralLevels,
-    sensor_log_gain: Floats,
-) -> tuple[Floats, Floats]:
-    """Information Jᵀ C⁻¹ J (points, P, P) on the parameters and gradient of the log likelihood (points, P), at the
-    first set of noise levels.
+_FROM_SLOPES = 1e-3  # m: the slopes dominate where the response changes by more than itself over this distance
 
-    The gradient is that of −½ log|C| − ½ rᵀC⁻¹r by the mean and by all columns of C that depend on the model. The
-    position slopes t are taken to change as L does, or not at all where t dominates.
+
+class Tangent:
+    """The likelihood of predictions at several points, linearised: what any changes J of the predictions would tell.
+
+    All columns are (points, 1, recordings), with the noise of each recording alone taken out (`reduced`), and
+    (points, 1, sensors) with that of the sensors.
     """
-    from underskin.diagnosis.inference.kernels import normal_equations as fill
-
-    sums, slope_sums = products.summed(levels), products.slope_sums(levels)
-    points, recordings = products.level.shape
-    uu, uy = (np.broadcast_to(x[:, 0], (points, recordings)) for x in (sums.uu, sums.uy))
-    none = np.zeros((points, recordings, 0))
-    by_level = none if products.level_slopes is None else products.level_slopes
-    turned = (none, none, none[..., None]) if slope_sums is None else (slope_sums.uv, slope_sums.vy, slope_sums.vv)
-    slopes = products.squared_slopes if np.any(levels.position) else None
-    squared_slopes = np.zeros((points, 0)) if slopes is None else slopes
-    noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)[:, 0]
-    count = max(by_level.shape[-1], turned[0].shape[-1])
-    information, gradient = np.empty((points, count, count)), np.empty((points, count))
-    arrays = (
-        products.level,
-        by_level,
-        uu,
-        uy,
-        *turned,
-        squared_slopes,
-    )
-    curvatures = curvature.laplacian, curvature.square
-    fill(
-        *map(contiguous, arrays),
-        lines.sensor,
-        contiguous(sensor_log_gain),
-        *curvatures,
-        contiguous(noise),
-        information,
-        gradient,
-    )
-    return information, gradient
-
-
-class Likelihoods:
-    """Terms of the likelihood of predictions at several points, each at some sets of noise levels."""
 
     def __init__(
         self, lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, sensor_log_gain: Floats
     ) -> None:
-        """`levels` (points, sets, 1), `sensor_log_gain` (points, sensors)."""
-        self.levels, self._products, self._curvature = levels, products, curvature
+        """`levels` (points, 1, 1), `sensor_log_gain` (points, sensors)."""
+        self._products, self._levels, self._curvature = products, levels, curvature
         self._sensors = lines.sensors
-        self._log_gains = log_gains = sensor_log_gain[:, None, lines.sensor]
-        k2, p2 = levels.level**2, levels.position**2
-        sums = products.summed(levels)
-        self._factor = factor = np.exp(log_gains + 0.5 * p2 * curvature.laplacian)
-        a = products.level[:, None] * factor
-        uu, ur = sums.uu / k2, (sums.uy - a * (1 - log_gains) * sums.uu) / k2
-        variance = (levels.gain**2 + 0.5 * p2**2 * curvature.square) * a**2
-        if products.squared_slopes is not None:
-            variance = variance + p2 * products.squared_slopes[:, None] * factor**2
-        reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)
-        self._shrink, self._weight = variance * reduced, a * reduced
+        self._log_gains = sensor_log_gain[:, None, lines.sensor]
+        self._k2, p2 = levels.level**2, levels.position**2
+        self._sums = sums = products.summed(levels)
+        self._factor = factor = np.exp(self._log_gains + 0.5 * p2 * curvature.laplacian)
+        self._a = a = products.level[:, None] * factor
+        self._mean = a * (1 - self._log_gains)
+        self._uu, self._ur = sums.uu / self._k2, (sums.uy - self._mean * sums.uu) / self._k2
+        self._as_model = levels.gain**2 + 0.5 * p2**2 * curvature.square
+        slopes = products.squared_slopes
+        self._moved = np.zeros(a.shape) if slopes is None else p2 * slopes[:, None] * factor**2
+        self._variance = self._as_model * a**2 + self._moved
+        self._reduced = 1 / (1 + self._variance * self._uu)  # 1 − (share of u taken out)
         tau2 = levels.spread**2
-        self._sensor_mr = (a * ur * reduced) @ self._sensors
-        self._sensor_shrink = tau2 / (1 + tau2 * ((a**2 * uu * reduced) @ self._sensors))
+        of_sensors = (a * self._reduced * np.concatenate([a * self._uu, self._ur], axis=1)) @ self._sensors
+        self._sensor_shrink = tau2 / (1 + tau2 * of_sensors[:, :1])
+        self._sensor_gains = self._sensor_shrink * of_sensors[:, 1:]
 
     @property
     def sensor_gains(self) -> Floats:
-        """The most probable b of each sensor (points, sensors), at the first set of noise levels."""
-        return np.asarray((self._sensor_shrink * self._sensor_mr)[:, 0])
+        """The most probable b of each sensor (points, sensors)."""
+        return np.asarray(self._sensor_gains[:, 0])
 
     def projections(self, position: float) -> tuple[Floats, Floats, Floats]:
         """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter [m],
         with weights 1/d² (without κ)."""
-        sums = self._products.summed(self.levels)
         log_gain, level = self._log_gains[0, 0], self._products.level[0]
-        uu, uy = np.broadcast_to(sums.uu[0, 0], level.shape), np.broadcast_to(sums.uy[0, 0], level.shape)
+        uu, uy = (np.broadcast_to(of[0, 0], level.shape) for of in (self._sums.uu, self._sums.uy))
         a = level * np.exp(log_gain + 0.5 * position**2 * self._curvature.laplacian)
         return a * uu, uy - a * (1 - log_gain) * uu, uu
 
+    @cached_property
+    def _slope_sums(self) -> SlopeSums | None:
+        return self._products.slope_sums(self._levels)
+
     @property
     def slope_projections(self) -> Floats:
-        """Re u*J of the first point's recordings (recordings, P), with the same weights."""
-        uu, factor = self._products.summed(self.levels).uu[0, 0], self._factor[0, 0]
-        by_level, sums = self._products.level_slopes, self._products.slope_sums(self.levels)
-        along = 0.0 if by_level is None else by_level[0] * (factor * uu)[:, None]
-        return np.asarray(along if sums is None else along + sums.uv[0] * (factor * self._products.level[0])[:, None])
+        """Re u*J (points, P, recordings) of the derivatives by the parameters, with the same weights."""
+        by_level, sums = self._products.level_slopes, self._slope_sums
+        along = 0.0 if by_level is None else by_level * self._factor * self._sums.uu
+        return np.asarray(along if sums is None else along + sums.uv * self._a)
 
     def information(self, uj: Floats, square: Floats) -> Floats:
-        """Jᵀ C⁻¹ J (points, P, P) of any J at the first set of noise levels.
+        """Jᵀ C⁻¹ J (points, P, P) of any J, from Re u*J (points, P, recordings) and Re JᵀJ (points, P, P), with weights
+        1/d²."""
+        along = uj / self._k2
+        by_sensor = (along * self._a * self._reduced) @ self._sensors
+        shared = (along * self._variance * self._reduced) @ along.swapaxes(1, 2)
+        shared += (by_sensor * self._sensor_shrink) @ by_sensor.swapaxes(1, 2)
+        return np.asarray(square / self._k2 - shared)
 
-        `uj` is Re u*J (points, recordings, P), `square` is Re JᵀJ (points, P, P), both divided by κ².
+    def information_on_forces(self, changes: Floats) -> Floats:
+        """The same of changes of the force of curves (P, samples), at the first point (P, P)."""
+        assert isinstance(self._products, CurveProducts)
+        along, square = self._products.with_force_changes(changes, self._levels)
+        return np.asarray(self.information(along[None], square[None])[0])
+
+    @property
+    def normal_equations(self) -> tuple[Floats, Floats]:
+        """Information Jᵀ C⁻¹ J (points, P, P) on the parameters and gradient of the log likelihood (points, P).
+
+        J = F ∂L u + a v. The gradient follows from those by L, Re u*u and Re u*y of each recording, and includes log|C|
+        and all columns of C that depend on the model.
         """
-        by_sensor = np.swapaxes(np.swapaxes(uj * self._weight[:, 0, :, None], 1, 2) @ self._sensors, 1, 2)
-        shared = by_sensor.transpose(0, 2, 1) @ (by_sensor * self._sensor_shrink[:, 0, :, None])
-        return np.asarray(square - np.einsum("nrp,nr,nrq->npq", uj, self._shrink[:, 0], uj, optimize=True) - shared)
+        by_level, sums = self._products.level_slopes, self._slope_sums
+        of_level, of_uv, of_vr = self._gradients
+        gradient, square = np.zeros(1), np.zeros(1)
+        if by_level is not None:
+            leveled = by_level * self._factor
+            square = (leveled * self._sums.uu) @ leveled.swapaxes(1, 2)
+            gradient = by_level @ of_level
+        if sums is not None:
+            square = square + (sums.vv @ (self._a**2)[..., None])[..., 0]
+            gradient = gradient + sums.uv @ of_uv + (sums.vy - self._mean * sums.uv) @ of_vr
+        if by_level is not None and sums is not None:
+            mixed = leveled @ (self._a * sums.uv).swapaxes(1, 2)
+            square = square + mixed + mixed.swapaxes(1, 2)
+        return self.information(self.slope_projections, square), gradient[..., 0]
+
+    @property
+    def _gradients(self) -> list[Floats]:
+        """Derivatives of the log likelihood (points, recordings, 1) by L, by Re u*v with Re v*r held, and by Re v*r, v
+        being a change of u and r the residual.
+
+        The position slopes are taken to change as L does, or not at all where they dominate.
+        """
+        a, uu, ur, variance, reduced = self._a, self._uu, self._ur, self._variance, self._reduced
+        gain = self._sensor_gains @ self._sensors.T
+        doubt = (self._sensor_gains**2 + self._sensor_shrink) @ self._sensors.T
+        by_ur = reduced * (variance * ur + a * gain)
+        by_reduced = 0.5 * variance * ur**2 - 0.5 * doubt * a**2 * uu + gain * a * ur
+        by_variance = 0.5 * reduced * (ur**2 - uu) - by_reduced * reduced**2 * uu
+        by_uu = -0.5 * reduced * (variance + doubt * a**2) - by_reduced * reduced**2 * variance
+        by_a = a * (2 * self._as_model * by_variance - doubt * uu * reduced) + gain * ur * reduced
+        by_level = self._factor * (by_a + ur - by_ur * uu)
+        if (slopes := self._products.squared_slopes) is not None:
+            level = self._products.level
+            along = _FROM_SLOPES**2 * slopes < level**2
+            moved = np.divide(2 * self._moved[:, 0], level, out=np.zeros(level.shape), where=along)
+            by_level = by_level + moved[:, None] * by_variance
+        columns = by_level, (2 * by_uu - by_ur * a) / self._k2, (a + by_ur) / self._k2
+        return [column.swapaxes(1, 2) for column in columns]
 
 
 @dataclass(frozen=True)
@@ -352,10 +369,18 @@ class Hypothesis:
         return np.array(rows).T
 
     @cached_property
+    def spans(self) -> dict[str, slice]:
+        """The slice of the model's parameters that belongs to each mechanism."""
+        return parameter_slices(self.model.names, self.lines)
+
+    def index(self, name: str) -> int:
+        """The index of one of the model's parameters."""
+        return [parameter.name for parameter in self.model.parameters].index(name)
+
+    @property
     def mechanism_parameter_count(self) -> int:
         """The number of parameters that belong to mechanisms; they come first."""
-        mechanisms = [self.lines.mechanisms[name] for name in self.model.names]
-        return sum(map(len, parameters_together(mechanisms, self.lines.campaign, self.lines.kind).values()))
+        return max((span.stop for span in self.spans.values()), default=0)
 
     @cached_property
     def _curve_lines(self) -> CurveLines:

@@ -9,6 +9,7 @@ pick-up weigh less, and the sums are corrected for it.
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from itertools import pairwise
 from typing import Any, ClassVar, Self
 
@@ -55,8 +56,7 @@ class AtPoints:
     shared: ClassVar[Collection[str]] = ()  # the fields that are the same at all points
 
     def _by_points(self) -> dict[str, Any]:
-        values = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in self.shared}
-        return {name: value for name, value in values.items() if value is not None}
+        return {name: value for name in _names_by_points(type(self)) if (value := getattr(self, name)) is not None}
 
     def __getitem__(self, points: Array | slice) -> Self:
         """At some of the points."""
@@ -74,13 +74,34 @@ class AtPoints:
         return replace(parts[0], **joined)
 
 
+@cache
+def _names_by_points(arrays: type[AtPoints]) -> list[str]:
+    return [field.name for field in fields(arrays) if field.name not in arrays.shared]
+
+
 @dataclass(frozen=True)
 class SlopeSums(AtPoints):
-    """Re u*v and Re v*y (points, recordings, parameters), and Re v*v (points, recordings, parameters, parameters)."""
+    """Re u*v and Re v*y (points, parameters, recordings), and Re v*v (points, parameters, parameters, recordings)."""
 
     uv: Floats
     vy: Floats
     vv: Floats
+
+    @classmethod
+    def of_moving(cls, moving: Indices, parameters: int, uv: Floats, vy: Floats, vv: Floats) -> Self:
+        """Of so many parameters, from the sums with derivatives by those that are `moving`."""
+        points, _, recordings = uv.shape
+        sums = cls(*(np.zeros((points, *[parameters] * axes, recordings)) for axes in (1, 1, 2)))
+        sums.uv[:, moving], sums.vy[:, moving], sums.vv[:, moving[:, None], moving] = uv, vy, vv
+        return sums
+
+
+def _squares(pairs: Floats, functions: int) -> Floats:
+    """Pairs of functions in the order of the upper triangle (points, pairs, …) as (points, functions, functions, …)."""
+    index = np.empty((functions, functions), dtype=np.intp)
+    first, second = np.triu_indices(functions)
+    index[first, second] = index[second, first] = np.arange(len(first))
+    return pairs[:, index]
 
 
 class PickupRows:
@@ -169,18 +190,18 @@ class CurveProducts(AtPoints):
         assert self.force_slopes is not None
         measured = np.broadcast_to(self.lines.measured, self.force.shape)
         rows = np.concatenate([self.force_slopes, self.force[:, None], measured[:, None]], axis=1)
-        grams = np.stack([*self._grams(rows, levels)], axis=1)
-        return SlopeSums(grams[..., :-2, -2], grams[..., :-2, -1], grams[..., :-2, :-2])
+        grams = np.stack([*self._grams(rows, levels)], axis=-1)
+        return SlopeSums(grams[:, :-2, -2], grams[:, :-2, -1], grams[:, :-2, :-2])
 
     def with_force_changes(self, rows: Floats, levels: SeveralLevels) -> tuple[Floats, Floats]:
-        """Re u*J (recordings, P) and Re JᵀJ (P, P) of changes of the force J (P, samples), at the first point and set
+        """Re u*J (P, recordings) and Re JᵀJ (P, P) of changes of the force J (P, samples), at the first point and set
         of noise levels."""
         changes = np.concatenate([self.lines.whitening.turned(rows), self.force[:1]])[None]
         along, square = [], np.zeros((len(rows), len(rows)))
         for (gram,) in self._grams(changes, levels):
             along.append(gram[-1, :-1])
             square += gram[:-1, :-1]
-        return np.array(along), square
+        return np.stack(along, axis=1), square
 
     def _grams(self, rows: Floats, levels: SeveralLevels) -> Iterator[Floats]:
         """Of each recording the products κ² X C⁻¹ Xᵀ (points, P, P) of transformed rows X (points, P, samples), with
@@ -272,7 +293,7 @@ class FrfProducts(AtPoints):
     uu: Floats  # (points, recordings)
     uy: Floats
     level: Floats
-    level_slopes: Floats | None  # (points, recordings, parameters)
+    level_slopes: Floats | None  # (points, parameters, recordings)
     squared_slopes: Floats | None  # |t|² of the slopes over the contact's place (points, recordings)
     turning: SlopeSums | None
     pickup: "PickupProducts | None" = None
@@ -282,7 +303,7 @@ class FrfProducts(AtPoints):
     def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
         """Of a model's response at several points, with the rows of its pick-up."""
         level, factor = response.level, response.lines
-        slopes = level.slopes.transpose(1, 2, 0) if len(level.slopes) else None
+        slopes = level.slopes.transpose(1, 0, 2) if len(level.slopes) else None
         uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
         turning = None
         if factor is not None:
@@ -347,45 +368,44 @@ class PickupProducts(AtPoints):
         uu, uy, yy = (np.broadcast_to(x, shape).copy() for x in (sums.uu, sums.uy, sums.yy))
         log_determinant = np.zeros(shape[:2])
         square = np.ascontiguousarray(np.swapaxes((levels.pickup / levels.level) ** 2, 1, 2))
-        subtract_pickup(square, *self.rows.columns, _complex(self.u), uu, uy, yy, log_determinant)
+        u = contiguous(self.u.astype(complex, copy=False))
+        subtract_pickup(square, *self.rows.columns, u, uu, uy, yy, log_determinant)
         return Sums(uu, uy, yy, log_determinant[..., None])
 
     def slopes_without_pickup(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
         """The sums with derivatives corrected for pick-up, at the first of the sets of noise levels."""
-        from underskin.diagnosis.kernels import subtract_pickup_slopes
-
         assert levels.pickup is not None
         if self.v is None:
             return sums
-        square = contiguous((levels.pickup[:, 0] / levels.level[:, 0, 0][:, None]) ** 2)
-        uv, vy, vv = (np.array(x) for x in (sums.uv, sums.vy, sums.vv))
-        rows = self.rows.columns
-        subtract_pickup_slopes(square, *rows, _complex(self.u), _complex(self.v), uv, vy, vv)
-        return SlopeSums(uv, vy, vv)
-
-
-def _complex(values: Array) -> Array:
-    return contiguous(values.astype(complex, copy=False))
+        alike, precision, recording, y, line = self.rows.columns
+        x = ((levels.pickup[:, 0] / levels.level[:, 0]) ** 2)[:, alike] * precision
+        moving = np.flatnonzero(self.v.any(axis=(0, 2)))
+        functions = np.concatenate([self.u[:, None], self.v[:, moving]], axis=1)[..., line]
+        functions = np.concatenate([functions, np.broadcast_to(y, (len(x), 1, len(y)))], axis=1)
+        first, second = np.triu_indices(functions.shape[1])
+        lost = (functions[:, first].conj() * functions[:, second]).real * (x / (1 + x) * precision)[:, None]
+        with_rows, starts = np.unique(recording, return_index=True)
+        pairs = np.zeros((*lost.shape[:2], self.rows.recordings))
+        pairs[..., with_rows] = np.add.reduceat(lost, starts, axis=-1)
+        square = _squares(pairs, functions.shape[1])
+        parts = square[:, 0, 1:-1], square[:, 1:-1, -1], square[:, 1:-1, 1:-1]
+        less = SlopeSums.of_moving(moving, self.v.shape[1], *parts)
+        return SlopeSums(sums.uv - less.uv, sums.vy - less.vy, sums.vv - less.vv)
 
 
 def _products_of_factor(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
     """Re u*u, Re u*y and the sums with the derivatives v of u (points, parameters, lines)."""
-    from underskin.diagnosis.kernels import line_products, spread_sums
+    from underskin.diagnosis.kernels import line_products
 
-    moving, count = np.flatnonzero(slopes.any(axis=(0, 2))), slopes.shape[1]
-    points, several = len(u), 1 + len(moving)
-    functions = np.empty((points, several, u.shape[1]), dtype=complex)
-    functions[:, 0], functions[:, 1:] = u, slopes[:, moving]
-    products = np.empty((points, several * (several + 1) // 2, u.shape[1]))
+    moving = np.flatnonzero(slopes.any(axis=(0, 2)))
+    functions = contiguous(np.concatenate([u[:, None], slopes[:, moving]], axis=1, dtype=complex))
+    points, several, numbers = functions.shape
+    products = np.empty((points, several * (several + 1) // 2, numbers))
     real, imag = np.empty(functions.shape), np.empty(functions.shape)
     line_products(functions, products, real, imag)
-    both = np.ascontiguousarray(lines.weight(products))
-    with_y = np.ascontiguousarray(lines.real(real) + lines.imag(imag))
-    recordings = both.shape[-1]
-    uv, vy = (np.zeros((points, recordings, count)) for _ in range(2))
-    vv = np.zeros((points, recordings, count, count))
-    spread_sums(both, with_y, moving, uv, vy, vv)
-    return both[:, 0], with_y[:, 0], SlopeSums(uv, vy, vv)
+    both, with_y = _squares(lines.weight(products), several), lines.real(real) + lines.imag(imag)
+    sums = SlopeSums.of_moving(moving, slopes.shape[1], both[:, 0, 1:], with_y[:, 1:], both[:, 1:, 1:])
+    return both[:, 0, 0], with_y[:, 0], sums
 
 
 Products = FrfProducts | CurveProducts

@@ -3,7 +3,7 @@
 - The residual of a recording is its relative deviation from the model; that of a line its deviation from its
   recording's best real multiple of the model. The lines of a recording share one gain error, so level and shape are
   kept apart.
-- Changes of the force of curves: their χ² after projection on the fitted parameters.
+- Changes of the prediction: what the fitted parameters absorb of them, and the χ² beyond that.
 - A mechanism may be present without being visible: a glue line that slips by the same share under every sphere only
   changes d33. The posterior of a parameter with that mechanism added is a mixture over values spread evenly over its
   prior, at each of which everything else is fitted again, each weighted by its evidence. Where the sensors' spread is
@@ -12,6 +12,7 @@
 """
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -25,8 +26,7 @@ from underskin.diagnosis.inference.evidence import (
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, parameter_slices
-from underskin.diagnosis.inference.products import CurveProducts
+from underskin.diagnosis.inference.hypothesis import Evaluated, Points
 from underskin.errors import InvalidInput
 from underskin.halton import halton
 from underskin.mechanisms.base import Normal, Unsupported
@@ -94,34 +94,46 @@ def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
     return force, slopes, -slopes[model.contact_points].sum(axis=0)
 
 
-def precision_of(hypothesis: Hypothesis) -> Floats:
-    """Precisions of the parameters' priors (parameters,)."""
-    return np.asarray(hypothesis.priors[0] + (FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
+@dataclass(frozen=True)
+class Linearised:
+    """What parameters of a fit and further changes of its prediction would tell, to first order: `information` JᵀC⁻¹J
+    on both, the parameters first, and the `precision` of the parameters' priors (parameters,)."""
 
+    information: Floats
+    precision: Floats
 
-def information(explanation: Explanation, rows: Floats, noise: Explanation | None = None) -> Floats:
-    """Jᵀ C⁻¹ J of changes of the force J (changes, samples), under the noise of the explanation or of another one."""
-    fitter = Fitter(explanation.best.hypothesis)
-    covariance = (noise or explanation).point.covariance
-    at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)))
-    levels = fitter.levels(at.points.covariance[:, None])
-    assert isinstance(at.products, CurveProducts)
-    along, square = at.products.with_force_changes(rows, levels)
-    likelihood = Likelihoods(fitter.lines, fitter.curvature, at.products, levels, at.points.sensor_log_gain)
-    level2 = float(levels.level.flat[0]) ** 2
-    return np.asarray(likelihood.information(along[None] / level2, square[None] / level2)[0])
+    @classmethod
+    def of_forces(
+        cls, explanation: Explanation, slopes: Floats, changes: Floats, noise: Explanation | None = None
+    ) -> Self:
+        """Of changes of the force of curves (changes, samples) beside its derivatives, the `slopes` (parameters,
+        samples), under the noise of the explanation or of another one."""
+        hypothesis = explanation.best.hypothesis
+        fitter, covariance = Fitter(hypothesis), (noise or explanation).point.covariance
+        at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)), slopes=False)
+        information = fitter.tangent(at.points, at.products).information_on_forces(np.concatenate([slopes, changes]))
+        return cls(information, hypothesis.priors[0] + (FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
 
+    @property
+    def of_changes(self) -> Floats:
+        """The information on the changes (changes, changes)."""
+        return self.information[len(self.precision) :, len(self.precision) :]
 
-def information_beyond(full: Floats, indices: Indices, precision: Floats) -> Floats:
-    """Information (changes, changes) on the changes after projection on the parameters.
+    def absorbed(self, indices: Indices | slice = slice(None)) -> Floats:
+        """How far each change shifts the parameters at these indices, all others held (indices, changes)."""
+        count = len(self.precision)
+        rows = np.arange(count)[indices]
+        block = self.information[np.ix_(rows, rows)] + np.diag(self.precision[rows])
+        return np.asarray(np.linalg.solve(block, self.information[rows, count:]), dtype=float)
 
-    `full` is the `information` on parameters and further changes, `indices` those of the parameters to project on,
-    `precision` that of all parameters (parameters,).
-    """
-    first = len(precision)
-    block = full[np.ix_(indices, indices)] + np.diag(precision[indices])
-    shared = full[first:, indices]
-    return np.asarray(full[first:, first:] - shared @ np.linalg.solve(block, shared.T))
+    def beyond(self, indices: Indices | slice = slice(None)) -> Floats:
+        """The information on the changes that the parameters at these indices leave (changes, changes)."""
+        shared = self.information[len(self.precision) :, : len(self.precision)][:, indices]
+        return np.asarray(self.of_changes - shared @ self.absorbed(indices))
+
+    def chi2(self, indices: Indices | slice = slice(None)) -> Floats:
+        """χ² by which each change would show beyond the parameters at these indices (changes,)."""
+        return np.diag(self.beyond(indices))
 
 
 _NODES = {0: 1, 1: 12, 2: 24}  # by number of parameters
@@ -146,7 +158,7 @@ def with_hidden_mechanism(
         hypothesis = problem.hypothesis(names, best.hypothesis.has_position_scatter)
     except (Unsupported, InvalidInput):
         return None
-    slices = parameter_slices(names, hypothesis.lines)
+    slices = hypothesis.spans
     new = range(slices[name].start, slices[name].stop)
     if any(
         len(explanation.coordinates(mechanism)) != slices[mechanism].stop - slices[mechanism].start
@@ -170,7 +182,7 @@ def with_hidden_mechanism(
     reference = mean_integrals(best.fitter, best.at)[0] + level_integrals(best.fitter, best.at)
     gained = log_evidence - reference
     shares = np.exp(np.minimum(gained, gained - gained.max() + _MOST)) / len(fit)
-    index = [parameter.name for parameter in hypothesis.model.parameters].index(parameter_name)
+    index = hypothesis.index(parameter_name)
     spread = marginalise_sensor_spread(held, at, index)
     if spread is not None:
         return NormalMixture.joined(
@@ -209,15 +221,13 @@ def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:
     """
     skin = problem.lines.campaign.skin
     off = skin.tolerances or Tolerances()
-    best = explanation.best
-    indices = {parameter.name: index for index, parameter in enumerate(explanation.model.parameters)}
-    rows = {name: best.hypothesis.mean_indices.index(indices[name]) for name in ("d33", "youngs_modulus", "thickness")}
     variance = (_by_sensor_radius(problem) * off.sensor_radius_percent / 100) ** 2
     percents = {"youngs_modulus": off.youngs_modulus_percent, "thickness": off.thickness_percent}
     for name, percent in percents.items():
-        prior = explanation.model.parameters[indices[name]].prior
+        index = explanation.index(name)
+        prior = explanation.model.parameters[index].prior
         assert isinstance(prior, Normal)
-        moved = float(best.covariance[rows["d33"], rows[name]]) / prior.sd**2
+        moved = float(explanation.best.covariance_of([explanation.index("d33"), index])[0, 1]) / prior.sd**2
         variance += moved**2 * max((percent / 100) ** 2 - prior.sd**2, 0.0)
     return float(np.sqrt(variance))
 

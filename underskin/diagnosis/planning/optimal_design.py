@@ -130,8 +130,7 @@ def _log_modulus(explanation: Explanation) -> tuple[float, float]:
     """ln of E over the declared modulus under an explanation, and its standard deviation."""
     names = [parameter.name for parameter in explanation.model.parameters]
     indices = [names.index(name) for name in _MODULUS if name in names]
-    rows = [explanation.best.hypothesis.mean_indices.index(index) for index in indices]
-    variance = float(explanation.best.covariance[np.ix_(rows, rows)].sum())
+    variance = float(explanation.best.covariance_of(indices).sum())
     return float(explanation.point.fit[indices].sum()), float(np.sqrt(max(variance, 0.0)))
 
 

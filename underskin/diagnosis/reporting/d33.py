@@ -18,11 +18,9 @@ from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.residuals import declared_d33, with_hidden_mechanism
 from underskin.diagnosis.reporting.numbers import (
     HIDES,
-    covariance_of,
     law_levels,
     of_logarithms,
     over_answers,
-    parameter_index,
 )
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, even_laws
@@ -53,7 +51,7 @@ def d33_over_answers(search: Search, problem: FittingProblem, unsure: float) -> 
     first, _ = parts[0]
     return {
         "name": "d33",
-        "unit": first.model.parameters[parameter_index(first, "d33")].unit,
+        "unit": first.model.parameters[first.index("d33")].unit,
         **of_logarithms(shares, mixture.mean, np.hypot(relative, declared)),
         "relative": {key: relative_ends[key] for key in ("low", "high")},
     }
@@ -62,11 +60,11 @@ def d33_over_answers(search: Search, problem: FittingProblem, unsure: float) -> 
 def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> NormalMixture:
     """ln d33 under an answer, at each reference level of its laws, and with one more mechanism that does not show; the
     shares sum to 1."""
-    index = parameter_index(explanation, "d33")
+    index = explanation.index("d33")
     best = explanation.best
     parts = marginalise_sensor_spread(best.fitter, best.at, index)
     if parts is None:
-        deviation = np.sqrt(covariance_of(explanation, [index])[0])
+        deviation = np.sqrt(explanation.best.covariance_of([index])[0])
         parts = [NormalMixture(np.ones(1), explanation.point.fit[index : index + 1], deviation)]
     parts = list(parts)
     if probability > HIDES:

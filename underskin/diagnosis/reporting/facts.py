@@ -18,7 +18,7 @@ from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.d33 import BY_NUISANCES, SEVERAL_ANSWERS, StatedD33, d33_over_answers
 from underskin.diagnosis.reporting.modulus import modulus_over_answers, modulus_under
-from underskin.diagnosis.reporting.numbers import parameter_index, parameters_of, rounded
+from underskin.diagnosis.reporting.numbers import parameters_of, rounded
 from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, law_document
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import KindsTogether
@@ -217,7 +217,7 @@ class Facts:
         errors: dict[str, Any] = {"rmse_percent": error}
         if lines.kind == "indentation":
             fit, residual_percent = explanation.least_squares
-            index = parameter_index(explanation, "youngs_modulus")
+            index = explanation.index("youngs_modulus")
             declared = lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is a factor on it
             modulus_mpa = declared * explanation.model.parameters[index].from_fit(float(fit[index]))
             errors = {

@@ -24,7 +24,6 @@ from underskin.diagnosis.localisation import MOST_LINES, axis_values
 from underskin.diagnosis.noise import path_fractions
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.kinds import KINDS
-from underskin.diagnosis.reporting.numbers import parameter_index
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.curve_course import curve_landmarks
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
@@ -132,7 +131,7 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> tuple[Cel
     fit, reading = plain_reading(problem, explanation, reading) or (fit, reading)
     predicted = []
     for recording, span in zip(lines.campaign.curves, lines.spans, strict=True):
-        contact = float(fit[parameter_index(explanation, f"contact_point {recording.id}")])
+        contact = float(fit[explanation.index(f"contact_point {recording.id}")])
         # The cell's reading in the air just before contact, including any drift
         in_air = np.flatnonzero(recording.displacement_mm[: int(recording.displacement_mm.argmax()) + 1] <= contact)
         shown = reading[span][in_air[-1]] if len(in_air) else cell.offset[span][0]

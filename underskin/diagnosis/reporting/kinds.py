@@ -8,12 +8,10 @@ from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.reporting.numbers import (
     ENDS,
     in_sentence,
-    parameter_index,
     parameter_with_interval,
     parameters_of,
     rounded,
     scaled,
-    spans,
     with_hidden,
 )
 from underskin.diagnosis.selection.other_kinds import MODULUS_ERROR, OtherKind
@@ -77,9 +75,9 @@ def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any
         else:
             curves = joined.other_kinds.posterior(kind, leading)
         fitted = curves.best
-        modulus = parameter_with_interval(fitted, parameter_index(fitted, "youngs_modulus"))
+        modulus = parameter_with_interval(fitted, fitted.index("youngs_modulus"))
         parameters = [with_hidden(modulus, curves.hidden, curves.tolerance)]
-        parameters += [parameter for name in spans(fitted) for parameter in parameters_of(fitted, name)]
+        parameters += [parameter for name in fitted.spans for parameter in parameters_of(fitted, name)]
         rows += [_row(kind.kind, parameter) for parameter in parameters]
     return rows
 
@@ -95,10 +93,10 @@ def _modulus_of_first_kind(joined: KindsTogether) -> list[dict[str, Any]]:
     kind, declared = joined.problem.kind, joined.problem.lines.campaign.skin.youngs_modulus_mpa
     fitted = joined.apart.fit_behind(joined.apart.answers[0])
     if declared is None:
-        return [_row(kind, parameter_with_interval(fitted, parameter_index(fitted, "youngs_modulus")))]
+        return [_row(kind, parameter_with_interval(fitted, fitted.index("youngs_modulus")))]
     if MODULUS_ERROR not in fitted.names:
         return []
-    factor = parameter_with_interval(fitted, spans(fitted)[MODULUS_ERROR].start)
+    factor = parameter_with_interval(fitted, fitted.spans[MODULUS_ERROR].start)
     return [_row(kind, {"name": "youngs_modulus", "unit": "MPa", **scaled(factor, declared)})]
 
 

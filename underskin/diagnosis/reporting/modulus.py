@@ -31,7 +31,7 @@ def modulus_over_answers(search: Search, problem: FittingProblem, shown: Explana
 
 def _log_modulus(problem: FittingProblem, explanation: Explanation) -> NormalMixture:
     """The logarithm of E [MPa]; the shares sum to 1."""
-    spans, index = numbers.spans(explanation), numbers.parameter_index(explanation, "youngs_modulus")
+    spans, index = explanation.spans, explanation.index("youngs_modulus")
     factor = [spans[MODULUS_ERROR].start] if MODULUS_ERROR in spans else []
     mixture = marginalise_curve_noise(explanation.best, [index, *factor])
     mixture = mixture.averaged_over(numbers.law_levels(problem, explanation, _LAW_FACTORS))
@@ -41,7 +41,7 @@ def _log_modulus(problem: FittingProblem, explanation: Explanation) -> NormalMix
 
 
 def _entry(problem: FittingProblem, explanation: Explanation, mixture: NormalMixture) -> dict[str, Any]:
-    index = numbers.parameter_index(explanation, "youngs_modulus")
+    index = explanation.index("youngs_modulus")
     at_bound = explanation.model.parameters[index].ends_search(float(explanation.point.fit[index]))
     declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is a factor on it
     stated = numbers.of_logarithms(mixture.share / mixture.share.sum(), mixture.mean, mixture.deviation)

@@ -83,23 +83,6 @@ def with_hidden(
     return {**modulus, **of_logarithms(shares, np.log(modulus["value"]) - excess, deviations)}
 
 
-def spans(explanation: Explanation) -> dict[str, slice]:
-    """The slice of an explanation's parameters that belongs to each of its mechanisms."""
-    return parameter_slices(explanation.names, explanation.best.hypothesis.lines)
-
-
-def parameter_index(explanation: Explanation, name: str) -> int:
-    """The index of a parameter in the explanation's model."""
-    return [parameter.name for parameter in explanation.model.parameters].index(name)
-
-
-def covariance_of(explanation: Explanation, indices: Sequence[int]) -> Floats:
-    """The covariance of parameters of the model's mean (indices, indices), in fit coordinates."""
-    rows = [explanation.best.hypothesis.mean_indices.index(index) for index in indices]
-    block: Floats = explanation.best.covariance[np.ix_(rows, rows)]
-    return block
-
-
 def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, Any]:
     """A parameter's most probable value and 95 % interval within its bounds: ±1.96 standard deviations.
 
@@ -114,7 +97,7 @@ def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, A
         row = [other.name for other in best.hypothesis.covariance].index(parameter.name)
         variance = float(levels_covariance(best.fitter.covariance_equations(best.at)[1][0])[row, row])
     else:
-        variance = float(covariance_of(explanation, [index])[0, 0])
+        variance = float(explanation.best.covariance_of([index])[0, 0])
     half_width = SDS_OF_95 * np.sqrt(max(variance, 0.0))
     low, high = parameter.bounds
     middle = float(explanation.point.fit[index])
@@ -126,8 +109,8 @@ def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, A
         ends[side] = ends[side] if end is None else end
     values = [parameter.from_fit(at) for at in (middle, *ends)]
     if parameter.relative_to is not None:
-        unit, both = multiple_of(explanation, parameter), [index, parameter_index(explanation, parameter.relative_to)]
-        deviation = np.sqrt(max(float(covariance_of(explanation, both).sum()), 0.0))
+        unit, both = multiple_of(explanation, parameter), [index, explanation.index(parameter.relative_to)]
+        deviation = np.sqrt(max(float(explanation.best.covariance_of(both).sum()), 0.0))
         value, factor = float(np.exp(explanation.point.fit[both].sum())), float(np.exp(SDS_OF_95 * deviation))
         least, most = min(parameter.low * unit, value), parameter.high * unit
         values = [value, max(value / factor, least), min(value * factor, most)]
@@ -142,7 +125,7 @@ def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, A
 
 def parameters_of(explanation: Explanation, name: str) -> list[dict[str, Any]]:
     """The parameters of one of its mechanisms with their intervals."""
-    span = spans(explanation)[name]
+    span = explanation.spans[name]
     return [parameter_with_interval(explanation, index) for index in range(span.start, span.stop)]
 
 
@@ -150,7 +133,7 @@ def multiple_of(explanation: Explanation, parameter: Parameter) -> float:
     """The unit of a parameter's bounds and prior: 1, or the value of the parameter that it is relative to."""
     if parameter.relative_to is None:
         return 1.0
-    other = parameter_index(explanation, parameter.relative_to)
+    other = explanation.index(parameter.relative_to)
     return explanation.model.parameters[other].from_fit(float(explanation.point.fit[other]))
 
 
@@ -161,7 +144,7 @@ def without_effect(explanation: Explanation) -> list[str]:
     A strength is a parameter with such a value (`limit`); on a logarithmic scale none reaches 0 or ∞.
     """
     idle = []
-    for name, span in spans(explanation).items():
+    for name, span in explanation.spans.items():
         limits = [parameter.limit for parameter in explanation.model.parameters[span]]
         strengths = [
             (stated, limit)
@@ -182,7 +165,7 @@ def _act_together(explanation: Explanation, span: slice) -> bool:
     if len(limits) < 2:
         return False
     off = explanation.point.fit[list(limits)] - np.array(list(limits.values()))
-    precision = np.linalg.pinv(covariance_of(explanation, list(limits)), hermitian=True)
+    precision = np.linalg.pinv(explanation.best.covariance_of(list(limits)), hermitian=True)
     return bool(off @ precision @ off > chdtri(len(limits), 1 - LEVEL))
 
 
@@ -195,7 +178,7 @@ def at_bounds(explanation: Explanation) -> dict[str, Finding]:
     mechanisms = explanation.best.hypothesis.lines.mechanisms
     owner = {
         index: in_plain_words(mechanisms[name])
-        for name, span in spans(explanation).items()
+        for name, span in explanation.spans.items()
         for index in range(span.start, span.stop)
     }
     bounds = {}

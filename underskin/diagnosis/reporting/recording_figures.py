@@ -21,7 +21,7 @@ from plotly.subplots import make_subplots
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.reporting.figure_data import SMALLEST, Mark, ShownCurve, ShownFrf
 from underskin.diagnosis.reporting.kinds import KindTraits
-from underskin.diagnosis.reporting.numbers import multiple_of, spans
+from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.reporting.page_styles import (
     LEAST_PHASE,
     PAPER,
@@ -398,7 +398,7 @@ _ROW, _SPACING = 140, 0.73  # height of a parameter's row [pixels], and the shar
 
 def parameter_intervals(shown: Explanation, mechanisms: Sequence[Mapping[str, Any]]) -> go.Figure:
     """Each parameter's 95 % interval in its unit; that of its prior is in words, since drawn it would dwarf it."""
-    priors = spans(shown)
+    priors = shown.spans
     rows = [
         (mechanism["name"], parameter, prior, multiple_of(shown, prior))
         for mechanism in mechanisms

@@ -19,11 +19,9 @@ from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.numbers import (
-    covariance_of,
     law_shares,
     parameters_of,
     rounded,
-    spans,
     with_ends,
 )
 from underskin.diagnosis.selection.answers import Search
@@ -147,13 +145,13 @@ class LeadingLaw:
 
     def variance(self, x: Floats) -> Floats:
         """Variance of the change, from the covariance of the law's parameters."""
-        span = spans(self.explanation)[self.law.name]
+        span = self.explanation.spans[self.law.name]
         here = self.change(x)
         slopes = []
         for parameter in self.law.parameters_stated:
             at = parameter.to_fit(self.values[parameter.name]) + _STEP
             slopes.append((self.change(x, {**self.values, parameter.name: parameter.from_fit(at)}) - here) / _STEP)
-        covariance = covariance_of(self.explanation, range(span.start, span.stop))
+        covariance = self.explanation.best.covariance_of(range(span.start, span.stop))
         return np.maximum(np.einsum("px,pq,qx->x", np.array(slopes), covariance, np.array(slopes)), 0.0)
 
 

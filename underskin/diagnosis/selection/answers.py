@@ -24,7 +24,6 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.noise import DISCREPANCY, USUAL
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.priors import (
@@ -80,8 +79,7 @@ def leading_first(ranked: Sequence[Answer]) -> list[Answer]:
 
 def fit_and_plausibility(explanation: Explanation) -> float:
     """Log likelihood plus log prior density at the best fit, the latter relative to the priors' peaks."""
-    slices = parameter_slices(explanation.names, explanation.best.hypothesis.lines)
-    parameters = [parameter for indices in slices.values() for parameter in explanation.model.parameters[indices]]
+    parameters = [parameter for span in explanation.spans.values() for parameter in explanation.model.parameters[span]]
     return -explanation.best.cost - sum(parameter.log_prior(parameter.start) for parameter in parameters)
 
 

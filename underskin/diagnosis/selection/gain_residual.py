@@ -148,9 +148,9 @@ class GainResidual:
     def __init__(self, problem: FittingProblem, explanation: Explanation) -> None:
         self._best, parameters = explanation.best, explanation.model.parameters
         best = self._best
-        size, _, _ = best.marginal.projections(best.levels.position)
+        size, _, _ = best.tangent.projections(best.levels.position)
         self._least = FAINT * np.abs(size).max()
-        slopes = best.marginal.slope_projections / self._above_faint(size)[:, None]
+        slopes = best.tangent.slope_projections[0].T / self._above_faint(size)[:, None]
         centre = np.array([parameter.start for parameter in parameters]) - best.point.fit
         scale = np.array([_prior_sd(parameter) for parameter in parameters])
         self._offset = slopes @ centre
@@ -166,7 +166,7 @@ class GainResidual:
         """No scatter of position and each of `positions` [m], with all of gain; relative to the model's mean there."""
         best, scatters = self._best, []
         for position, share in _position_probabilities(positions).items():
-            size, ur, uu = best.marginal.projections(position)
+            size, ur, uu = best.tangent.projections(position)
             size = self._above_faint(size)
             second_order = best.hypothesis.curvature.square
             position_variance = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * second_order

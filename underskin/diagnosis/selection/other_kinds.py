@@ -235,29 +235,26 @@ def _posterior(explanation: Explanation, shared: frozenset[str]) -> tuple[tuple[
     A uniform prior counts as a normal one of its variance about the fit, as in `_moments`: indentations determine
     E/(1 − ν²), so that E and ν trade along a ridge, which ν between its bounds cuts short.
     """
-    modulus = [entry.name for entry in explanation.model.parameters].index("youngs_modulus")
     best = explanation.best
     indices, (precision, *_) = best.hypothesis.mean_indices, best.hypothesis.priors
     widths = np.ptp(best.hypothesis.bounds, axis=0)
     bounded = np.where(precision == 0, 12 / np.maximum(widths, 1e-12) ** 2, 0.0)[indices]
     covariance = np.linalg.inv(np.linalg.inv(best.covariance) + np.diag(bounded))
-    quantities, mean, rows = _quantities(explanation, best.point.fit, shared, modulus)
+    quantities, mean, rows = _quantities(explanation, best.point.fit, shared)
     slopes = rows[:, indices]
     return quantities, mean, slopes @ covariance @ slopes.T
 
 
 def _quantities(
-    explanation: Explanation, fit: Floats, shared: frozenset[str], modulus: int
+    explanation: Explanation, fit: Floats, shared: frozenset[str]
 ) -> tuple[tuple[Quantity, ...], Floats, Floats]:
-    """Shared quantities, their values at a point and slopes over the fit coordinates (quantities, parameters).
-
-    `modulus` is the index of the modulus among the parameters.
-    """
+    """Shared quantities, their values at a point and slopes over the fit coordinates (quantities, parameters)."""
     parameters, lines = explanation.model.parameters, explanation.best.hypothesis.lines
+    modulus = explanation.index("youngs_modulus")
     quantities: list[Quantity] = [MODULUS]
     values = [fit[modulus] + np.log(to_si("youngs_modulus_mpa", 1.0))]
     rows = [np.eye(len(fit))[modulus]]
-    for name, span in parameter_slices(explanation.names, lines).items():
+    for name, span in explanation.spans.items():
         if name not in shared:
             continue
         seeds = {
@@ -392,10 +389,9 @@ class CurveLikelihood:
         if not fits:
             return 0.0, np.inf
         fit = max(fits, key=lambda fit: ({*fit.names} == {*names}, fit.log_evidence))
-        span = parameter_slices(fit.names, fit.best.hypothesis.lines)[mechanism]
+        span = fit.spans[mechanism]
         index = span.start + [stated.name for stated in fit.model.parameters[span]].index(parameter)
-        row = fit.best.hypothesis.mean_indices.index(index)
-        return float(fit.point.fit[index]), float(fit.best.covariance[row, row])
+        return float(fit.point.fit[index]), float(fit.best.covariance_of([index])[0, 0])
 
 
 def _acts_on(name: str, lines: Lines) -> bool:

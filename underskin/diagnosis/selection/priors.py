@@ -11,7 +11,6 @@ import numpy as np
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.moving_contact_edge import MovingContactEdge
 
@@ -87,7 +86,7 @@ def edge_gain(explanation: Explanation, log_odds: float) -> float:
     edge, lines = MovingContactEdge.name, explanation.best.hypothesis.lines
     if edge not in even_laws(explanation.names, lines) & {*explanation.names}:
         return 0.0
-    fraction = parameter_slices(explanation.names, lines)[edge].start
+    fraction = explanation.spans[edge].start
     return float(np.logaddexp(explanation.best.log_density_at_end(fraction), log_odds))
 
 

@@ -23,11 +23,9 @@ from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import PRUNE_NATS, Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.residuals import (
     MAY_MATTER_NATS,
+    Linearised,
     force_and_slopes,
-    information,
-    information_beyond,
     line_residuals,
-    precision_of,
 )
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.gain_residual import GainResidual
@@ -282,12 +280,8 @@ class CurveScreening:
         changes = [self._changes(law, samples, force, stiffness) for law, _ in self.laws]
         residual = self._lines.value.real - force
         flat_changes = [change.reshape(-1, len(force)) for change in changes]
-        joint_information = information(
-            explanation, np.concatenate([slopes, *flat_changes, residual[None]]), self._best
-        )
-        marginal = information_beyond(
-            joint_information, np.arange(len(slopes)), precision_of(explanation.best.hypothesis)
-        )
+        columns = np.concatenate([*flat_changes, residual[None]])
+        marginal = Linearised.of_forces(explanation, slopes, columns, self._best).beyond()
         scores, first = [], 0
         for (law, log_share), change in zip(self.laws, changes, strict=True):
             points, count = change.shape[:2]

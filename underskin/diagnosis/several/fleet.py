@@ -15,7 +15,7 @@ import numpy as np
 
 from underskin.diagnosis.inference.explanation import PRUNE_NATS, Explanation
 from underskin.diagnosis.inference.gaussian import Gaussian
-from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
+from underskin.diagnosis.inference.hypothesis import quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.report import report, reported
@@ -249,7 +249,7 @@ def strengths(candidates: Mapping[str, CampaignFits], sets: Sequence[Names]) -> 
     states: dict[tuple[str, str], dict[str, list[State]]] = {}
     for (skin, candidate), names in zip(candidates.items(), sets, strict=True):
         fit = candidate.fit(names)
-        for mechanism, span in parameter_slices(fit.names, fit.best.hypothesis.lines).items():
+        for mechanism, span in fit.spans.items():
             for index in range(span.start, span.stop):
                 parameter, likelihood = fit.model.parameters[index], _likelihood(fit, index)
                 if parameter.scale == "log" and likelihood is not None:
@@ -276,11 +276,9 @@ def strengths(candidates: Mapping[str, CampaignFits], sets: Sequence[Names]) -> 
 def _likelihood(fit: Explanation, index: int) -> Gaussian | None:
     """The likelihood of one fit coordinate by the recordings only, without the prior; None where they hardly inform, or
     the coordinate changes the covariance only."""
-    hypothesis = fit.best.hypothesis
-    if index not in hypothesis.mean_indices:
+    if index not in fit.best.hypothesis.mean_indices:
         return None
-    row, at = hypothesis.mean_indices.index(index), float(fit.point.fit[index])
-    after = 1 / float(fit.best.covariance[row, row])
+    at, after = float(fit.point.fit[index]), 1 / float(fit.best.covariance_of([index])[0, 0])
     prior, centre = quadratic_of_prior(fit.model.parameters[index], at)
     if after - prior < _INFORMS * prior:
         return None

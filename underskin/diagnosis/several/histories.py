@@ -19,10 +19,10 @@ from underskin.diagnosis.data.names import RIVAL_SHARE
 from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import PRUNE_NATS, Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.gaussian import Gaussian
-from underskin.diagnosis.inference.hypothesis import parameter_slices, quadratic_of_prior
+from underskin.diagnosis.inference.hypothesis import quadratic_of_prior
 from underskin.diagnosis.inference.residuals import with_hidden_mechanism
 from underskin.diagnosis.reporting.facts import DiagnosisResult
-from underskin.diagnosis.reporting.numbers import COUNTS, parameter_index
+from underskin.diagnosis.reporting.numbers import COUNTS
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Search
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.mechanisms.base import Parameter
@@ -54,14 +54,12 @@ class SharedParameters:
     def of(cls, fit: Explanation, mechanisms: Sequence[str], others: Sequence[str] = ()) -> Self:
         """Of these mechanisms' parameters, and of `others` of the model by name."""
         hypothesis, model = fit.best.hypothesis, fit.model.parameters
-        slices = parameter_slices(fit.names, hypothesis.lines)
-        indices = [index for name in mechanisms for index in range(len(model))[slices[name]]]
+        indices = [index for name in mechanisms for index in range(len(model))[fit.spans[name]]]
         indices += [index for name in others for index, parameter in enumerate(model) if parameter.name == name]
         indices = [index for index in indices if index in hypothesis.mean_indices]
-        rows = [hypothesis.mean_indices.index(index) for index in indices]
         priors = [_normal_prior(model[index], float(fit.point.fit[index])) for index in indices]
         prior_mean, prior_precision = np.array(priors).reshape(-1, 2).T
-        further = np.linalg.inv(fit.best.covariance[np.ix_(rows, rows)]) - np.diag(prior_precision)
+        further = np.linalg.inv(fit.best.covariance_of(indices)) - np.diag(prior_precision)
         added, vectors = np.linalg.eigh(further)
         precision = np.diag(prior_precision) + (vectors * np.maximum(added, 0.0)) @ vectors.T
         return cls(
@@ -321,11 +319,10 @@ def d33_uncertainties(fits: Sequence[CampaignFits], leader: SetHistory) -> list[
 def _d33_variance(fit: Explanation, known: Sequence[str]) -> float:
     """The variance of ln d33 where the parameters of some mechanisms are `known`."""
     rows = fit.best.hypothesis.mean_indices
-    slices = parameter_slices(fit.names, fit.best.hypothesis.lines)
-    fixed = {index for name in known for index in range(len(fit.model.parameters))[slices[name]]}
+    fixed = {index for name in known for index in range(len(fit.model.parameters))[fit.spans[name]]}
     free = [row for row, index in enumerate(rows) if index not in fixed]
     precision = np.linalg.inv(fit.best.covariance)[np.ix_(free, free)]
-    d33 = free.index(rows.index(parameter_index(fit, "d33")))
+    d33 = free.index(rows.index(fit.index("d33")))
     return float(np.linalg.inv(precision)[d33, d33])
 
 
@@ -333,7 +330,7 @@ def causes(campaign: CampaignFits, names: Names, size: float, deviation: float) 
     """The mechanisms that, added to a campaign's own `names`, would change ln d33 of all sensors by `size`: ageing,
     which is d33 itself and only decreases it, then the most probable first."""
     fit = campaign.moving_fit(names)
-    before = float(fit.point.fit[parameter_index(fit, "d33")]) - size
+    before = float(fit.point.fit[fit.index("d33")]) - size
     weights = {AGEING: float(np.exp(log_normal(size, USUAL_CHANGE**2)))} if size < 0 else {}
     for name in campaign.problem.lines.mechanisms.named:
         if name not in (*names, AGEING):

@@ -386,7 +386,7 @@ class FleetSkin:
     def _likelihood(self, fit: Explanation, best: Evidence, held: Sequence[str]) -> Gaussian:
         """The likelihood of the quantities by one fit: the posterior divided by the priors, of errors and usual
         ones."""
-        slices = parameter_slices(fit.names, best.hypothesis.lines)
+        slices = fit.spans
         names = [parameter.name for parameter in fit.model.parameters]
         matrix = np.zeros((len(QUANTITIES), len(names)))
         centre, variance, log_evidence = np.zeros(len(QUANTITIES)), np.zeros(len(QUANTITIES)), best.log_evidence

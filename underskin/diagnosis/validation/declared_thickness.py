@@ -14,7 +14,6 @@ import numpy as np
 
 from underskin.diagnosis.data.dataset import curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import parameter_slices
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import least_evidence, log_prior_of
 from underskin.findings.codes import Reason
@@ -76,9 +75,8 @@ def _of_any_thickness(campaign: Campaign, problem: FittingProblem, stated: Seque
 
 def _thickness(fit: Explanation) -> tuple[float, float, float]:
     """Lower end, value and upper end [mm]."""
-    index = parameter_slices(fit.names, fit.best.hypothesis.lines)[_LAYER].start
-    row = fit.best.hypothesis.mean_indices.index(index)
-    half, at = SDS_OF_95 * np.sqrt(fit.best.covariance[row, row]), fit.point.fit[index]
+    index = fit.spans[_LAYER].start
+    half, at = SDS_OF_95 * np.sqrt(fit.best.covariance_of([index])[0, 0]), fit.point.fit[index]
     parameter = fit.model.parameters[index]
     low, value, high = (parameter.from_fit(float(end)) for end in (at - half, at, at + half))
     return low, value, high
@@ -86,6 +84,6 @@ def _thickness(fit: Explanation) -> tuple[float, float, float]:
 
 def _modulus(campaign: Campaign, fit: Explanation) -> float:
     """E by a fit [MPa]."""
-    index = [parameter.name for parameter in fit.model.parameters].index("youngs_modulus")
+    index = fit.index("youngs_modulus")
     factor = fit.model.parameters[index].from_fit(float(fit.point.fit[index]))  # on a declared one
     return factor * (campaign.skin.youngs_modulus_mpa or 1.0)

@@ -17,13 +17,12 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import parameter_slices
-from underskin.diagnosis.inference.residuals import force_and_slopes, information, information_beyond, precision_of
+from underskin.diagnosis.inference.residuals import Linearised, force_and_slopes
 from underskin.diagnosis.selection.priors import PRIORS, guess_count, least_evidence, log_prior
 from underskin.diagnosis.validation.signatures import least_chi2
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.recordings.campaign import CurveConditions
-from underskin.units import Floats, Indices
+from underskin.units import Floats
 
 _FORMS: Mapping[str, Callable[[Floats], Floats]] = {  # of a variable from 0 to 1
     "root": np.sqrt,
@@ -47,18 +46,16 @@ def odds_of_imitated_laws(explanation: Explanation, null: Explanation, supported
     null_model = null.best.hypothesis.model
     assert isinstance(null_model, CurveModel)
     change = force - null_model.forces(null.point.fit[None])[0]
-    joint = information(explanation, np.concatenate([slopes, laws, change[None]]))
-    indices = np.arange(len(fit))
-    precision = precision_of(hypothesis)
-    beyond_nuisances = _chi2_beyond(joint, indices[hypothesis.mechanism_parameter_count :], precision)
-    visible = beyond_nuisances[:-1] > _ROUNDING * np.diag(joint)[len(fit) : -1]
+    linearised = Linearised.of_forces(explanation, slopes, np.concatenate([laws, change[None]]))
+    beyond_nuisances = linearised.chi2(slice(hypothesis.mechanism_parameter_count, None))
+    visible = beyond_nuisances[:-1] > _ROUNDING * np.diag(linearised.of_changes)[:-1]
     if not (visible.any() and beyond_nuisances[-1] > 0):
         return 0.0
     strength = beyond_nuisances[-1] / beyond_nuisances[:-1][visible]
     least = least_chi2(supported, least_evidence(explanation))
-    imitated = strength * _chi2_beyond(joint, indices, precision)[:-1][visible] < least
-    for span in parameter_slices(explanation.names, hypothesis.lines).values():
-        imitated &= strength * _chi2_beyond(joint, np.delete(indices, span), precision)[:-1][visible] > least
+    imitated = strength * linearised.chi2()[:-1][visible] < least
+    for span in explanation.spans.values():
+        imitated &= strength * linearised.chi2(np.delete(np.arange(len(fit)), span))[:-1][visible] > least
     return _odds(int(imitated.sum()), int(visible.sum()), guess_count(explanation), supported)
 
 
@@ -66,8 +63,7 @@ def _odds_of_hidden_laws(null: Explanation, supported: int) -> float:
     force, slopes, laws = _changes(null)
     size = np.sqrt((laws**2).mean(axis=1))
     laws = laws[size > 0] * (_USUAL_CHANGE * np.sqrt((force**2).mean()) / size[size > 0])[:, None]
-    joint = information(null, np.concatenate([slopes, laws]))
-    chi2 = _chi2_beyond(joint, np.arange(len(slopes)), precision_of(null.best.hypothesis))
+    chi2 = Linearised.of_forces(null, slopes, laws).chi2()
     hidden = int((chi2 < least_chi2(supported, least_evidence(null))).sum())
     return _odds(hidden, len(laws), 0, supported)
 
@@ -107,8 +103,3 @@ def _law_changes(
     forms = [way_back, *itertools.chain(*shapes.values())]
     laws = [factor * form for factor in (force, stiffness) for form in forms]
     return np.array([*laws, *shapes.get("time", [])])  # an added force follows time
-
-
-def _chi2_beyond(joint: Floats, indices: Indices, precision: Floats) -> Floats:
-    """χ² of each change beyond the parameters at these indices, with their priors' precision (changes,)."""
-    return np.diag(information_beyond(joint, indices, precision))

@@ -25,12 +25,12 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import EXPLAINED, RIVAL_SHARE
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
-from underskin.diagnosis.inference.hypothesis import Likelihoods
+from underskin.diagnosis.inference.residuals import Linearised
 from underskin.diagnosis.noise import TYPICAL, NoiseLevels, SeveralLevels
 from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.selection.priors import least_evidence, log_prior
 from underskin.inversion.mixed_model import USUAL_GAIN
-from underskin.mechanisms.base import Kind, Normal, Parameter, Stage, Unsupported
+from underskin.mechanisms.base import Kind, Parameter, Stage, Unsupported
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Array, Floats
@@ -84,16 +84,14 @@ class Signatures:
         """Index of each mechanism's typical signature: its first."""
         return {name: self.mechanisms.index(name) for name in self.mechanisms}
 
-    def projection(self, levels: NoiseLevels) -> "Projection":
-        """The information on the signatures under this noise, and what the nuisances d33, E and h absorb of them."""
-        nuisances = self._fitter.model.parameters
-        full, count = self._information(levels), len(nuisances)
-        precision = [parameter.prior.sd**-2 if isinstance(parameter.prior, Normal) else 0.0 for parameter in nuisances]
-        shared = full[count:, :count]
-        absorbed = np.linalg.solve(full[:count, :count] + np.diag(precision), shared.T)
-        d33 = [index for index, parameter in enumerate(nuisances) if parameter.name == "d33"]
-        information = full[count:, count:]
-        return Projection(information, information - shared @ absorbed, np.asarray(absorbed[d33], dtype=float))
+    def linearised(self, levels: NoiseLevels) -> Linearised:
+        """The signatures as changes of the base model's prediction under this noise, its parameters being the
+        nuisances."""
+        return Linearised(self._information(levels), self._fitter.hypothesis.priors[0])
+
+    def d33_shifts(self, linearised: Linearised) -> Floats:
+        """The error of ln d33 by each (signatures,), of FRFs."""
+        return linearised.absorbed()[self._fitter.hypothesis.index("d33")]
 
     def _products(self, smooth: float) -> tuple[Floats, Floats]:
         """Re u*J and Re JᵀJ of the nuisances and the signatures; of curves with a smooth error of that share."""
@@ -114,26 +112,8 @@ class Signatures:
             for value in (levels.gain, levels.level, levels.position, levels.spread, levels.smooth)
         )
         several = SeveralLevels(gain, level, position, spread, None, smooth)
-        likelihood = Likelihoods(
-            fitter.lines, self._problem.curvature, base.products, several, base.points.sensor_log_gain
-        )
         along, square = self._products(levels.smooth if fitter.lines.curves else 0.0)
-        return likelihood.information(along / levels.level**2, square / levels.level**2)[0]
-
-
-@dataclass(frozen=True, eq=False)
-class Projection:
-    """The `information` (signatures, signatures) on signatures, the same with the nuisances `projected` out, and the
-    error of ln d33 by each (1, signatures); without d33, as of curves, (0, signatures)."""
-
-    information: Floats
-    projected: Floats
-    d33_shifts: Floats
-
-    @property
-    def chi2(self) -> Floats:
-        """χ² by which each signature would show (signatures,)."""
-        return np.diag(self.projected)
+        return fitter.tangent(base.points, base.products, several).information(along, square)[0]
 
 
 class _Rows:
@@ -167,7 +147,7 @@ class _Rows:
         return along - self.base, across
 
     def products(self, parts: Sequence[Split]) -> tuple[Floats, Floats]:
-        """Re u*J (1, recordings, P) and Re JᵀJ (1, P, P) of split columns J."""
+        """Re u*J (1, P, recordings) and Re JᵀJ (1, P, P) of split columns J."""
         along = np.array([part for part, _ in parts])
         square = along @ along.T
         with_across = [index for index, (_, component) in enumerate(parts) if component is not None]
@@ -176,7 +156,7 @@ class _Rows:
             for first in range(0, len(across[0]), _BLOCK_NUMBERS):
                 block = np.array([component[first : first + _BLOCK_NUMBERS] for component in across], dtype=float)
                 square[np.ix_(with_across, with_across)] += block @ block.T
-        return (along * self._size).T[None], square[None]
+        return (along * self._size)[None], square[None]
 
     def _whitened(self, rows: Floats) -> Floats:
         """Real rows scaled so that their errors are independent with variance 1."""
@@ -218,7 +198,7 @@ def power(signatures: Signatures, explanation: Explanation, supported: int) -> l
     the answer's `explanation`; `supported` is the number of mechanisms among which the prior is shared."""
     if not signatures.mechanisms:
         return []
-    chi2 = signatures.projection(explanation.best.levels).chi2
+    chi2 = signatures.linearised(explanation.best.levels).chi2()
     least = least_chi2(supported, least_evidence(explanation))
     limits = [
         Power(name, signatures.percent[index] * float(np.sqrt(least / chi2[index])))
@@ -269,15 +249,14 @@ def hidden_shifts(
     """
     if problem.lines.curves or not signatures.mechanisms:
         return []
-    projection = signatures.projection(explanation.best.levels)
+    linearised = signatures.linearised(explanation.best.levels)
+    chi2, shifts = linearised.chi2(), signatures.d33_shifts(linearised)
     least = least_chi2(supported, least_evidence(explanation))
     mechanisms = problem.lines.mechanisms
     return [
-        HiddenShift(name, float(projection.d33_shifts[0, index]), mechanisms[name].stage is Stage.DECLARED)
+        HiddenShift(name, float(shifts[index]), mechanisms[name].stage is Stage.DECLARED)
         for name, index in signatures.typical.items()
-        if name not in explanation.names
-        and projection.chi2[index] < least
-        and not other_kinds & {*mechanisms[name].kinds}
+        if name not in explanation.names and chi2[index] < least and not other_kinds & {*mechanisms[name].kinds}
     ]
 
 
@@ -309,11 +288,12 @@ def confounding(signatures: Signatures) -> list[Confounding]:
     mechanisms, first = signatures.mechanisms, signatures.typical
     if not mechanisms:
         return []
-    projection = signatures.projection(NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD, smooth=TYPICAL))
-    chi2 = np.maximum(projection.chi2, 0.0)
+    linearised = signatures.linearised(NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD, smooth=TYPICAL))
+    information, projected = np.diag(linearised.of_changes), linearised.beyond()
+    chi2 = np.maximum(np.diag(projected), 0.0)
     confounded = []
     for name, index in first.items():
-        if projection.information[index, index] < _LEAST_CHI2:
+        if information[index] < _LEAST_CHI2:
             confounded.append(Confounding(name, "noise", Likeness.NOISE))
         elif chi2[index] < _LEAST_CHI2:
             confounded.append(Confounding(name, "d33", Likeness.TAKEN_UP))
@@ -325,7 +305,7 @@ def confounding(signatures: Signatures) -> list[Confounding]:
         ):
             typical_index = first[typical]
             rivals = [index for index, name in enumerate(mechanisms) if name == imitator and chi2[index] >= _LEAST_CHI2]
-            cosine = projection.projected[typical_index, rivals] / np.sqrt(chi2[typical_index] * chi2[rivals])
+            cosine = projected[typical_index, rivals] / np.sqrt(chi2[typical_index] * chi2[rivals])
             distance = (1 - cosine**2) * np.minimum(chi2[typical_index], chi2[rivals])
             if (np.abs(cosine) > _CONFOUNDED_COSINE).any() or (distance < _LEAST_CHI2).any():
                 confounded.append(Confounding(first_name, second_name, why))
