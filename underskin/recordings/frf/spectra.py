@@ -78,6 +78,7 @@ _COARSE = 0.2  # share of samples equal to the one before, above which the level
 _ONE_LEVEL = 1.5
 _BY_CHANCE = 1e-3  # expected number of equally long runs in the whole signal
 _JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
+_ROUNDED = 2.0  # levels: rounding by half a level changes a second difference by so many at most
 _BLOW, _RINGING = 20.0, 6.0  # kurtosis: 1.5 of a sine, 3 of noise, hundreds of a hammer's blow, tens of its ringing
 _AS_SHARP = 0.5  # of a jump: least second difference a period later, where a periodic signal restarts
 _GIVE_OR_TAKE = 2  # samples, since a period need not be a whole number of them
@@ -190,6 +191,8 @@ def defects(channel: str, signal: Floats) -> list[Defect]:
     """
     if len(signal) < 3:
         return []
+    if signal.min() == signal.max():
+        return [Defect(DefectKind.ONE_VALUE, channel, len(signal), 0)]
     rest = _rest(signal)
     clipped = _overload(signal, rest)
     held = _held(signal) & ~clipped & ~rest
@@ -428,7 +431,9 @@ def _held(signal: Floats) -> Mask:
     usual, width = float(same.mean()), 2 * _LOCAL + 1
     around = uniform_filter1d(same.astype(float), width)
     level, leap = float(step[step > 0].min(initial=np.inf)), 2 * np.quantile(step, 0.999)
+    levels = np.maximum(np.pad(_around(_curvature(signal), _last_digit), 1, mode="edge"), level)
     for first, count in _runs(same):
+        level = levels[first]
         after = step[first + count - 1] if first + count < len(signal) else 2 * level
         alike = max(usual, around[first + count // 2] - count / width)
         by_chance = usual > _COARSE or len(signal) * alike**count > _BY_CHANCE
@@ -439,17 +444,41 @@ def _held(signal: Floats) -> Mask:
 
 def _jumps(signal: Floats) -> Mask:
     mask = np.zeros(len(signal), dtype=bool)
+    curvature = _curvature(signal)
+    usual, levels = _around(curvature, _usual_size), _around(curvature, _last_digit)
+    mask[1:-1] = (curvature > _JUMP * usual + _ROUNDED * levels) & (usual > 0)
+    return mask
+
+
+def _curvature(signal: Floats) -> Floats:
+    """The magnitude of the second differences, without those of the binary representation of decimal numbers."""
     curvature = np.abs(np.diff(signal, n=2))
-    # Parts of two lengths, so that each length is processed at once: a long series has some ten thousand parts.
+    return np.where(curvature > _ROUNDING * np.abs(signal).max(), curvature, 0.0)
+
+
+def _around(curvature: Floats, summed: Callable[[Floats], Floats]) -> Floats:
+    """The largest of what `summed` gives for the part that each sample lies in and the parts on both sides.
+
+    Parts of two lengths, so that each length is processed at once: a long series has some ten thousand parts.
+    """
     length, longer = divmod(len(curvature), max(1, len(curvature) // _LOCAL))
     parts = np.split(curvature, [longer * (length + 1)])
     sizes = (length + 1, length)
-    medians = [np.median(part.reshape(-1, size), axis=1) for part, size in zip(parts, sizes, strict=True)]
-    usual = 1.4826 * np.concatenate(medians)
+    of_parts = [summed(part.reshape(-1, size)) for part, size in zip(parts, sizes, strict=True)]
+    usual = np.concatenate(of_parts)
     around = np.max([np.roll(usual, shift) for shift in (-1, 0, 1)], axis=0)
-    scale = np.repeat(around, np.repeat(sizes, [len(of_size) for of_size in medians]))
-    mask[1:-1] = (curvature > _JUMP * scale) & (scale > 0)
-    return mask
+    return np.asarray(np.repeat(around, np.repeat(sizes, [len(part) for part in of_parts])))
+
+
+def _usual_size(parts: Floats) -> Floats:
+    return np.asarray(1.4826 * np.median(parts, axis=1))
+
+
+def _last_digit(parts: Floats) -> Floats:
+    """The least second difference, other than 0, of parts (parts, samples): of rounded numbers their last digit, which
+    may change along a series as numbers of some significant digits pass 1; of others next to nothing."""
+    least = np.where(parts > 0, parts, np.inf).min(axis=1, initial=np.inf)
+    return np.where(np.isfinite(least), least, 0.0)
 
 
 def _runs(mask: Mask) -> list[tuple[int, int]]:
