@@ -256,3 +256,15 @@ def test_skin_and_noise_limit_no_charge(kind: str, power: float) -> None:
         assert defects_of_pair(with_preload, with_preload**power + 0.3 * noise) == []
         for charge in (1.2 * np.tanh(force / 1.2), np.clip(force, -0.8, 0.8), np.minimum(force, 0.7)):
             assert {d.kind for d in defects_of_pair(with_preload, charge + noise)} & {"limited", "overload"}
+
+
+def test_noise_of_the_force_limits_no_sweep() -> None:
+    """A charge linear in a slow sweep is whole where a tenth of the power of the recorded force is noise."""
+    time = np.arange(16_384) / 1000.0
+    growth = np.log(75.0) / time[-1]
+    shaker = np.sin(2 * np.pi * 2.0 * np.expm1(growth * time) / growth)
+    for seed in range(12 if SOAK else 3):
+        random = np.random.default_rng(seed)
+        force = 10.0 + shaker + np.sqrt(0.1 * shaker.var() / 0.3) * random.standard_normal(len(time))
+        charge = shaker + 0.01 * random.standard_normal(len(time))
+        assert defects_of_pair(force, charge) == []

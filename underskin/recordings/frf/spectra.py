@@ -319,18 +319,23 @@ class _LinearResponses:
 
     def of(self, effect: Floats) -> Floats:
         """The part of the effect that follows (samples,)."""
-        from scipy.signal import fftconvolve  # takes 0.3 s to load, which few need
+        return self._through(self._transfer(self._blocks.spectra(effect)))
 
-        impulse = np.fft.fftshift(np.fft.irfft(self._transfer(self._blocks.spectra(effect)), self.size))
-        return np.asarray(fftconvolve(self.cause, impulse)[self.size // 2 : self.size // 2 + len(self.cause)])
-
-    def noise(self, effect: Floats) -> float:
-        """The share of the effect's power that does not follow, at the lines of what does."""
+    def missed_by_noise(self, effect: Floats) -> Floats:
+        """What the response lacks (samples,) if all that does not follow is by noise of the cause: u times the response
+        at each line, u = (1 − γ²)/γ², by which H1 is too small; 0 at lines that do not follow."""
         spectra = self._blocks.spectra(effect)
         transfer = self._transfer(spectra)
         rest = np.mean(np.abs(spectra - transfer * self._spectra) ** 2, axis=0)
         response = np.abs(transfer) ** 2 * self.power
-        return float((rest / np.maximum(rest + response, _TINY)) @ response / max(float(response.sum()), _TINY))
+        follows = rest < (len(spectra) - 1) * response  # γ² above the 1/n that n blocks of noise have
+        return self._through(transfer * np.where(follows, rest / np.maximum(response, _TINY), 0.0))
+
+    def _through(self, transfer: Complexes) -> Floats:
+        from scipy.signal import fftconvolve  # takes 0.3 s to load, which few need
+
+        impulse = np.fft.fftshift(np.fft.irfft(transfer, self.size))
+        return np.asarray(fftconvolve(self.cause, impulse)[self.size // 2 : self.size // 2 + len(self.cause)])
 
 
 _FALLS_BEHIND = 0.02  # up to 2 % d33 is taken as it is
@@ -391,8 +396,9 @@ def _is_limited(force: Floats, charge: Floats) -> bool:
 def _cubic(cause: Floats, effect: Floats, period: int) -> _Cubic:
     """The part of an effect that follows the cube of its linear response x of unit power, c₃x³: a loss of −c₃⟨x⁴⟩.
 
-    Noise of the cause, a share α of the response's power, adds α (3 − ⟨x⁴⟩)⟨x⁴⟩/⟨h²⟩ at most, where h is what the
-    linear response leaves of the cube, and is taken off.
+    Noise n of the cause, normal and independent of the signal, makes x too small by y at most (`missed_by_noise`). As
+    ⟨g(x) n⟩ = ⟨g'(x)⟩⟨n²⟩ (Stein 1981), the rest then has the product ⟨(x³ − 3x) y⟩ with the cube, over ⟨h²⟩ for h,
+    what the linear response leaves of the cube, its coefficient: what that adds to the loss is taken off.
     """
     cause, effect = cause - cause.mean(), effect - effect.mean()
     responses = _LinearResponses(cause, len(cause) // _PARTS, period)
@@ -417,7 +423,8 @@ def _cubic(cause: Floats, effect: Floats, period: int) -> _Cubic:
     fourth, cube = float(np.mean(x**4)), float(np.mean(powers[1] ** 2))
     freedom = max(1 / max(float(share @ share), _TINY) - 1, 1.0)
     chance = stdtr(freedom, coefficients[1] / max(float(np.sqrt(variance)), _TINY))
-    by_noise = responses.noise(effect) * max(3 - fourth, 0.0) * fourth / max(cube, _TINY)
+    missed = responses.missed_by_noise(effect)[middle] / rms
+    by_noise = max(float(np.mean((3 * x - x**3) * missed)), 0.0) * fourth / max(cube, _TINY)
     left = cube / max(float(np.mean(x**6)) - fourth**2, _TINY)
     return _Cubic(float(-coefficients[1] * fourth - by_noise), float(chance), left)
 
