@@ -162,6 +162,13 @@ def test_sensor_died_two_dates_comes_first_hides(seed: int, table: SigmaTable) -
     }
 
 
+def test_a_sensor_reversed_on_one_date_is_said(table: SigmaTable) -> None:
+    """What one campaign's recordings were turned by stands in the joint statement, not in its findings alone."""
+    before, after = dates()
+    statement = reported([before, with_gain(after, s04=-1.0)], table)["statement"]
+    assert "In september: sensor 's04' answers with the opposite sign of the others: reversed" in statement
+
+
 def test_slow_fall_array_over_four_dates_change(table: SigmaTable) -> None:
     """A slow fall of the array over four dates is a change.
 

@@ -18,6 +18,8 @@ from underskin.findings.sentences import ImplausibleD33
 from underskin.inversion.invert import Inversion, invert
 from underskin.prediction.pressed_skin import response_shares
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.frf.estimation import estimate
+from underskin.recordings.frf.line_choice import usable_lines
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Complexes, Floats
 
@@ -127,6 +129,42 @@ def test_recording_grossly_off_set_aside_named(table: SigmaTable, sensors: int, 
     assert covered(found.sensors, rig.d33).all()
     assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
     assert found.flags == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [("dead", "no charge beyond noise, while sensor 's1'"), ("inverted", "opposite sign of other recordings")],
+)
+def test_sensor_that_failed_on_one_date(table: SigmaTable, change: str, said: str) -> None:
+    """A sensor that was dead, or inverted, on one of two dates has the d33 of the other one, and the array keeps it."""
+    rig = Rig(d33=np.full(6, 14.0))
+    random = np.random.default_rng(14)
+    first_date, second = (simulate(table, rig, random) for _ in range(2))
+    later = [replace(recording, id=f"later {recording.id}") for recording in altered(second, "s1", change).recordings]
+    found = invert(replace(first_date, recordings=(*first_date.recordings, *later)), table)
+    assert found.campaign_d33 is not None
+    assert float(found.campaign_d33.value) == pytest.approx(14e-12, rel=0.05)
+    assert found.sensors.value == pytest.approx(14e-12, rel=0.05)
+    assert {left.sentence.split(":")[0] for left in found.left_out} == {
+        f"recording {recording.id}"
+        for recording in later
+        if isinstance(recording, FrfRecording) and recording.sensor == "s1"
+    }
+    assert all(said in left.sentence for left in found.left_out)
+
+
+def test_steady_noise_of_the_force_under_a_sweep() -> None:
+    """Noise in the force of a slow sweep, whose lines it biases unequally, is no gain that changes: it is taken off."""
+    random, rate, samples = np.random.default_rng(5), 1000.0, 16_384
+    time = np.arange(samples) / rate
+    growth = np.log(75.0) / time[-1]
+    shaker = 0.09 * np.sin(2 * np.pi * 2.0 * np.expm1(growth * time) / growth)
+    white = np.sqrt(0.05 * shaker.var() / 0.3) * random.standard_normal(samples)
+    charge = 7e-12 * shaker + 7e-14 * random.standard_normal(samples)
+    (lines,) = usable_lines([estimate(1.0 + shaker + white, charge, rate)])
+    assert lines.frf.gain_change is None
+    level = np.median(lines.frf.values.real[lines.frf.used_or_all])
+    assert level == pytest.approx(7e-12, rel=0.02)
 
 
 @pytest.mark.parametrize(("percent", "scatter", "marked"), [(-15, 0.02, True), (-3, 0.002, False), (-15, 0.3, False)])

@@ -57,6 +57,8 @@ def recorded(
                     clean = clean * resonance(frequency, radius, preload)
                 if "high-pass" in shape:
                     clean = clean * (1j * frequency / 2) / (1 + 1j * frequency / 2)
+                if "rise" in shape:
+                    clean = clean * (1 + (frequency / 80) ** 2)
                 if "relaxation" in shape:
                     clean = clean * (1j * frequency / 30) ** -0.03
                 noise = (
@@ -164,6 +166,11 @@ def test_lowest_resonances_ends_zone_named() -> None:
     assert zone.low_hz == LOG_GRID[0]
     assert "the sphere of 4 mm radius at 0.5 N" in zone.reason
     assert "moving with the contact" in zone.reason
+
+
+def test_a_rise_to_the_last_line_is_no_peak() -> None:
+    """A response that rises up to the end, as far below a resonance, has no peak."""
+    assert "the response rises or scatters by more than 2 %, without a peak in range" in zone_of("rise").reason
 
 
 def test_high_pass_begins_relaxation_not_end() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from underskin.errors import FileError
+from underskin.errors import FileError, InvalidInput
 from underskin.recordings import Reading, read_contents, read_file
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.channels import Contents
@@ -94,6 +94,17 @@ def test_three_decimals_after_decimal_comma() -> None:
     assert refusal(changed("\t16\n", "\t16,000\n", tabs)).place == "line 4, column 2"
     commas = tabs.replace(".", ",").replace("skin,", "skin.")
     assert read(changed("\t16\n", "\t16,000\n", commas)).campaign.skin.youngs_modulus_mpa == 16
+
+
+def test_thousands_before_a_decimal_mark() -> None:
+    """With a decimal mark behind them separated thousands leave no doubt, in either style."""
+    semicolons = PLAIN.replace(",", ";").replace(".", ",").replace("skin,", "skin.")
+    tabs = PLAIN.replace(",", "\t")
+    for text, mark, cell in ((semicolons, ";", "16.016,25"), (tabs, "\t", "16,016.25")):
+        in_kpa = changed(f"skin.youngs_modulus_mpa{mark}16\n", f"skin.youngs_modulus [kPa]{mark}{cell}\n", text)
+        assert read(in_kpa).campaign.skin.youngs_modulus_mpa == pytest.approx(16.01625)
+    with pytest.raises(InvalidInput, match=r"'1\.01,25': must be a number"):
+        read(changed(";16\n", ";1.01,25\n", semicolons))
 
 
 def test_decimal_point_among_decimal_commas() -> None:

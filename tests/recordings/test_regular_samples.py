@@ -151,11 +151,25 @@ def test_a_clock_with_jitter_is_resampled(jitter: float, seed: int) -> None:
         assert columns["force_n"][20:-20] == pytest.approx(signal(even)[20:-20], abs=5e-3)
 
 
-@pytest.mark.parametrize("change", ["a sample is missing", "a time comes twice", "two clocks", "backwards"])
+@pytest.mark.parametrize("lost", [[700], [2000, 2001, 2002, 2500]])
+def test_of_a_clock_with_gaps_the_longest_part_is_used(lost: list[int]) -> None:
+    """Lost samples end a part; several gaps that leave less than half are refused by number and place."""
+    time = clock(1000.0)
+    kept = np.delete(np.arange(len(time)), lost)
+    columns, rate, note = evenly_sampled({"force_n": kept.astype(float)}, time[kept])
+    assert (np.diff(columns["force_n"]) == 1).all()
+    assert len(columns["force_n"]) >= len(time) / 2
+    assert rate == pytest.approx(1000.0, rel=1e-6)
+    assert f"the clock misses {len(lost)} samples, the first after {time[lost[0] - 1]:.6g} s" in note
+    many = np.delete(time, np.arange(500, len(time), 500))
+    with pytest.raises(ValueError, match=r"the clock misses .* less than half: record again"):
+        evenly_sampled({"force_n": np.ones(len(many))}, many)
+
+
+@pytest.mark.parametrize("change", ["a time comes twice", "two clocks", "backwards"])
 def test_an_uneven_clock_is_refused(change: str) -> None:
     time = clock(1000.0)
     wrong = {
-        "a sample is missing": np.delete(time, 700),
         "a time comes twice": np.concatenate([time[:700], time[699:]]),
         "two clocks": np.concatenate([time[:1500], time[1499] + np.arange(1, 1500) * 1.4e-3]),
         "backwards": time[::-1],

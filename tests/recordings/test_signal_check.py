@@ -36,6 +36,33 @@ def test_overload_of_a_converter_whose_last_bits_flicker(bits: int) -> None:
     assert defects("charge_pc", step * np.round(charge / step)) == []
 
 
+@pytest.mark.parametrize("digits", [3, 4, 5])
+def test_rounded_slow_sweeps_are_whole(digits: int) -> None:
+    """Rounding is no jump, also where numbers of so many digits pass 1 and their last digit changes."""
+    time = np.arange(16_384) / 1000.0
+    force = 1.2 + 0.3 * np.sin(2 * np.pi * 1.0 * 90.0 ** (time / time[-1]) * time[-1] / np.log(90.0))
+    rounded = np.array([float(f"{value:.{digits}g}") for value in force])
+    assert defects("force_n", rounded) == []
+    jumped = np.delete(rounded, slice(8000, 8080))
+    assert any(abs(defect.first_sample - 8000) < 3 for defect in defects("force_n", jumped))
+
+
+def test_tones_that_change_at_any_phase_are_whole() -> None:
+    """Where one tone follows another with a jump, none of its samples was dropped."""
+    time = np.arange(4000) / RATE
+    force = 2.0 + 0.09 * np.concatenate([np.sin(2 * np.pi * hz * time) for hz in (3.1, 3.98, 5.98, 12.1)])
+    frf = stepped_sine(force, answer_to(force), RATE)
+    assert frf.defects == ()
+    assert rms_error(frf) < 0.01
+
+
+def test_a_channel_of_one_value_is_not_connected() -> None:
+    """A charge that never changes is no charge of which samples were dropped."""
+    force, _ = shaken(3, samples=4000)
+    with pytest.raises(InvalidInput, match="are all one value: a dead sensor, or a channel that is not connected"):
+        broadband(force, np.zeros(4000), RATE)
+
+
 @pytest.mark.parametrize("samples", [0, 1, 2, 3])
 def test_a_few_samples_show_no_defect(samples: int) -> None:
     signal = np.arange(float(samples))
@@ -229,3 +256,15 @@ def test_skin_and_noise_limit_no_charge(kind: str, power: float) -> None:
         assert defects_of_pair(with_preload, with_preload**power + 0.3 * noise) == []
         for charge in (1.2 * np.tanh(force / 1.2), np.clip(force, -0.8, 0.8), np.minimum(force, 0.7)):
             assert {d.kind for d in defects_of_pair(with_preload, charge + noise)} & {"limited", "overload"}
+
+
+def test_noise_of_the_force_limits_no_sweep() -> None:
+    """A charge linear in a slow sweep is whole where a tenth of the power of the recorded force is noise."""
+    time = np.arange(16_384) / 1000.0
+    growth = np.log(75.0) / time[-1]
+    shaker = np.sin(2 * np.pi * 2.0 * np.expm1(growth * time) / growth)
+    for seed in range(12 if SOAK else 3):
+        random = np.random.default_rng(seed)
+        force = 10.0 + shaker + np.sqrt(0.1 * shaker.var() / 0.3) * random.standard_normal(len(time))
+        charge = shaker + 0.01 * random.standard_normal(len(time))
+        assert defects_of_pair(force, charge) == []

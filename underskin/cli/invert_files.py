@@ -21,6 +21,7 @@ from rich.text import Text
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.errors import InvalidInput, TableError, UnderskinError, not_unique, of_file, wrong_type
+from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits, left_out_lines, significant
 from underskin.inversion import elastomer
 from underskin.inversion.elastomer import RecordingModulus
@@ -89,7 +90,10 @@ class InvertedFile:
         notes += left_out_lines((recording, str(why)) for recording, why in refused)
         if isinstance(self.inversion, Inversion):
             notes.append(_TO_QUOTE)
-            notes += [f"left out: {omission.sentence}" for omission in self.inversion.left_out]
+            omitted = self.inversion.left_out
+            of_recordings = [part for part in omitted if isinstance(part, Finding) and part.recording]
+            notes += left_out_lines((part.recording, part.statement) for part in of_recordings)
+            notes += [f"left out: {part.sentence}" for part in omitted if part not in of_recordings]
         notes += [words for words in (self._of_frame, self._of_platens) if words]
         return notes
 

@@ -108,6 +108,8 @@ class Reason(StrEnum):
     FAR_CONTACTS = "far_contacts"
     EXCLUDED = "excluded"
     OUTLIER = "outlier"
+    OUTLIER_SILENT = "outlier.silent"
+    OUTLIER_INVERTED = "outlier.inverted"
     CURVE_TOO_DEEP = "units_off_by_1000.curve_too_deep"
     SPHERE_TOO_DEEP = "units_off_by_1000.sphere_too_deep"
     MODULUS_BESIDE_OTHERS = "units_off_by_1000.modulus_beside_others"

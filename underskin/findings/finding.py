@@ -182,6 +182,10 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.FAR_CONTACTS: far_contacts,
     Reason.EXCLUDED: "Left out: {excluded_for}",
     Reason.OUTLIER: "its d33 of {d33_pc_per_n:.3g} pC/N is grossly off all others",
+    Reason.OUTLIER_SILENT: "no charge beyond noise, while sensor {sensor!r} responds in other recordings: was it "
+    "dead or not connected?",
+    Reason.OUTLIER_INVERTED: "the charge has the opposite sign of other recordings of sensor {sensor!r}: was a cable, "
+    "an amplifier or a sign changed between them?",
     Reason.CURVE_TOO_DEEP: "pressed {moved_mm:.3g} mm, more than {share:g} of its sample's height ({most_mm:.3g} mm): "
     "given in µm? Left out",
     Reason.SPHERE_TOO_DEEP: "pressed {moved_mm:.3g} mm, more than ten times the sphere's width ({most_mm:.3g} mm): "

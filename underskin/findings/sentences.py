@@ -64,6 +64,7 @@ class DefectKind(StrEnum):
 
     OVERLOAD = "overload"
     LIMITED = "limited"
+    ONE_VALUE = "one_value"
     HELD_SAMPLES = "held_samples"
     JUMP = "jump"
 
@@ -73,6 +74,7 @@ class DefectKind(StrEnum):
         return {
             DefectKind.OVERLOAD: "stay at the end of the range: overload",
             DefectKind.LIMITED: "follow the force less the further they go, as behind a limit: overload",
+            DefectKind.ONE_VALUE: "are all one value: a dead sensor, or a channel that is not connected",
             DefectKind.HELD_SAMPLES: "repeat one value: samples were dropped and the last one held",
             DefectKind.JUMP: "break the signal's course: samples were dropped, or a spike",
         }[self]

@@ -37,7 +37,9 @@ from underskin.inversion.sensor_flags import (
     ENOUGH,
     Flag,
     difference_flags,
+    is_alive,
     population_flags,
+    responds,
     typical_size,
     without_groups,
 )
@@ -130,6 +132,7 @@ def _curvature(residual: Floats, preload: Floats, expected: Floats) -> tuple[flo
 
 
 _FAR = 8.0  # deviations
+_MISSING = 3.0  # deviations: the least that a response differs from none
 _LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are considered
 
 
@@ -137,24 +140,38 @@ def outlying(rows: "RecordingD33", position: Floats) -> Indices:
     """The recordings inside that lie more than 8 robust deviations from their sensor's d33, less the effect of their
     condition; `position` (recordings,): the relative deviation of each for a sphere misplaced as far as is usual.
 
-    Where all recordings of a sensor do, the sensor is off and none of its recordings is an outlier.
+    A sensor may have been dead, or inverted, on one of several dates: where it responds in half of its recordings or
+    enough for a median, its d33 is that of these, and no usual misplacement hides the others. Where all recordings of a
+    sensor are far, it is off and none of its recordings is an outlier.
     """
     good = np.flatnonzero(rows.inside)
     sensor, d33 = rows.sensor[good], rows.d33[good]
     array = typical_size(d33)
-    relative = _over_usual(sensor, d33, array)
+    usual = _usual(sensor, responds(d33, rows.d33_uncertainty[good]))
+    relative = _over_usual(sensor, d33, usual, array)
     residual = relative - _common(sensor, rows.condition[good], relative, float(np.median(relative)))
     scatter = ROBUST * float(np.median(np.abs(residual)))
     expected = np.hypot(np.hypot(_LEAST_DEVIATION, position[good]), rows.d33_uncertainty[good] / array)
     far: Mask = np.abs(residual) > _FAR * np.maximum(scatter, expected)
+    far |= ~usual & (_MISSING * expected < 1)
     for index in np.unique(sensor[far]):
         if far[sensor == index].all():
             far[sensor == index] = False
     return good[far]
 
 
-def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
-    """Each recording over the median of its sensor, or of the array where the sensor has few recordings.
+def _usual(sensor: Indices, responding: Mask) -> Mask:
+    """The recordings of which a sensor's d33 is the median: the `responding` ones, or all where these are few."""
+    usual = responding.copy()
+    for index in np.unique(sensor):
+        same = sensor == index
+        if usual[same].sum() < ENOUGH and 2 * usual[same].sum() < same.sum():
+            usual[same] = True
+    return usual
+
+
+def _over_usual(sensor: Indices, d33: Floats, usual: Mask, array: float) -> Floats:
+    """Each recording over the median of its sensor's `usual` ones, or over the array's where it has few recordings.
 
     A dead sensor's recordings are 1 + their distance from its median, in units of the array's d33.
     """
@@ -162,7 +179,7 @@ def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
     for index in np.unique(sensor):
         same = sensor == index
         if same.sum() >= ENOUGH:
-            middle = float(np.median(d33[same]))
+            middle = float(np.median(d33[same & usual]))
             over[same] = 1 + (d33[same] - middle) / (middle if abs(middle) > _LEAST_DEVIATION * array else array)
     return over
 
@@ -175,6 +192,23 @@ def _common(sensor: Indices, condition: Indices, relative: Floats, otherwise: fl
         if len(np.unique(sensor[of_condition])) >= ENOUGH:
             common[of_condition] = np.median(relative[of_condition])
     return common
+
+
+def _far_off(ids: tuple[str, ...], rows: "RecordingD33", outliers: Indices) -> list[Finding]:
+    """The findings on outliers: those without charge, those of the other sign, and the others with their d33."""
+    findings, kept = [], np.setdiff1d(np.flatnonzero(rows.inside), outliers)
+    alive = np.zeros(len(rows.d33), dtype=bool)
+    alive[rows.inside] = is_alive(rows.d33[rows.inside], rows.d33_uncertainty[rows.inside])
+    for row in outliers.tolist():
+        others = kept[(rows.sensor[kept] == rows.sensor[row]) & alive[kept]]
+        reason, name = Reason.OUTLIER, ids[rows.sensor[row]]
+        if len(others) and not alive[row]:
+            reason = Reason.OUTLIER_SILENT
+        elif len(others) and float(np.median(rows.d33[others])) * rows.d33[row] < 0:
+            reason = Reason.OUTLIER_INVERTED
+        value = float(to_lab("d33_pc_per_n", rows.d33[row]))
+        findings.append(Finding(reason, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": value, "sensor": name}))
+    return findings
 
 
 _CONTRADICTS = 3.0  # times
@@ -540,10 +574,7 @@ def _estimated(
     moments = [contact.positioned.scattered(p / contact.thickness) for p in mixed_model.POSITIONS]
     mean, variance = (np.array(part) for part in zip(*moments, strict=True))
     outliers = outlying(rows, np.sqrt((mean[-1] - 1) ** 2 + np.maximum(variance[-1], 0)))
-    far_off = [
-        Finding(Reason.OUTLIER, rows.ids[row], "d33_pc_per_n", {"d33_pc_per_n": value})
-        for row, value in zip(outliers, to_lab("d33_pc_per_n", rows.d33[outliers]).tolist(), strict=True)
-    ]
+    far_off = _far_off(ids, rows, outliers)
     good = np.setdiff1d(np.flatnonzero(rows.inside), outliers)
     sensor, d33, noise = rows.sensor[good], rows.d33[good], rows.d33_uncertainty[good]
     unfit, pilot, factor, of_groups = without_groups(

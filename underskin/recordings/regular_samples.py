@@ -219,9 +219,15 @@ def _are_multiples(time: Floats, digit: Floats | float) -> bool:
 def evenly_sampled(columns: Columns, time: Floats) -> tuple[dict[str, Floats], float, str]:
     """The columns at even times, samples per unit of `time`, and what was done.
 
-    A clock with jitter has its rate by regression, and the columns are interpolated by cubic splines. Raises ValueError
-    where the clock misses samples or varies by more.
+    A clock with jitter has its rate by regression, and the columns are interpolated by cubic splines. Of one that
+    misses samples the longest part without a gap is used. Raises ValueError where that is less than half, or where the
+    clock varies by more.
     """
+    ends = _gaps(time)
+    if len(ends):
+        part, note = _longest_without(ends, time)
+        even, rate, further = evenly_sampled({name: column[part] for name, column in columns.items()}, time[part])
+        return even, rate, "; ".join(filter(None, (note, further)))
     rate = even_rate(time)
     if rate is not None:
         rounded = _rounded_clock(time)
@@ -243,6 +249,29 @@ def evenly_sampled(columns: Columns, time: Floats) -> tuple[dict[str, Floats], f
         resampled = {name: np.asarray(CubicSpline(time, column)(even)) for name, column in columns.items()}
     jitter = f"{100 * off.std() / step:.2g} % of a step rms"
     return resampled, 1 / step, f"the clock varies by {jitter}: the samples were interpolated at even times"
+
+
+def _gaps(time: Floats) -> Indices:
+    """The last samples before the gaps of a clock: steps of two or more of its usual steps, where all are whole
+    numbers of them, within a quarter; empty where they are not."""
+    with np.errstate(all="ignore"):
+        steps = np.diff(time) / np.median(np.diff(time)) if len(time) > 1 else np.zeros(0)
+        is_clock = bool((np.abs(steps - np.rint(steps)) < _HALF**2).all() and (steps > _HALF).all())
+    return np.flatnonzero(steps > 2 - _HALF) if is_clock else np.zeros(0, dtype=np.intp)
+
+
+def _longest_without(ends: Indices, time: Floats) -> tuple[slice, str]:
+    """The longest part between the gaps after these samples, and a note; raises ValueError where that is too short."""
+    usual = float(np.median(np.diff(time)))
+    missing = int(np.rint(np.diff(time)[ends] / usual - 1).sum())
+    starts, stops = np.append(0, ends + 1), np.append(ends + 1, len(time))
+    longest = int(np.argmax(stops - starts))
+    part = slice(int(starts[longest]), int(stops[longest]))
+    gaps = f"the clock misses {missing} samples, the first after {time[ends[0]]:.6g} s"
+    whole = f"the longest part without a gap has {part.stop - part.start} of {len(time)}"
+    if part.stop - part.start < _HALF * len(time):
+        raise ValueError(f"{gaps}; {whole}, less than half: record again without losing samples")
+    return part, f"{gaps}: {whole}, which alone is used"
 
 
 def complete_lines(columns: Columns) -> tuple[dict[str, Floats], str]:

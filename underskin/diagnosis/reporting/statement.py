@@ -6,7 +6,7 @@ its rivals, the usual cause, and what to quote.
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -347,6 +347,11 @@ _RESERVES = (
     ),
     *(FindingCode.HELD_OUT_NO_BETTER, FindingCode.UNUSUAL_SCATTER),
 )
+
+
+def slip_clauses(findings: Sequence[Mapping[str, str]], stated: Collection[FindingCode] = ()) -> list[str]:
+    """Clauses on the slips of a report, but for those `stated` elsewhere."""
+    return _clauses(findings, [code for code in SLIPS if code not in stated])
 
 
 def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCode]) -> list[str]:

@@ -25,6 +25,7 @@ from underskin.diagnosis.reporting.d33 import StatedD33
 from underskin.diagnosis.reporting.headline import WORDS, within_words
 from underskin.diagnosis.reporting.numbers import at_bound_in_words, rounded
 from underskin.diagnosis.reporting.report import ALTERNATIVES, EMPTY, LEAST_PROBABILITY, Reported
+from underskin.diagnosis.reporting.statement import slip_clauses
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory
 from underskin.diagnosis.several.population import D33, REGULAR, STATED, Populations
 from underskin.diagnosis.several.sensors import (
@@ -37,7 +38,7 @@ from underskin.diagnosis.several.sensors import (
     exchanges,
     over_sets,
 )
-from underskin.findings.codes import Reason
+from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import few, in_percent, listed, of_clauses
 from underskin.inversion.array_history import FEWEST_DATES, TWO_DATES, array_change_in_words
@@ -131,7 +132,7 @@ def together_document(name: str, skin: SkinOverDates) -> dict[str, Any]:
         for ring in exchanges(skin.changes)
     ]
     sensors = {**_failure_clauses(skin), **_exchange_clauses(skin)}
-    decisive = [*sensors.values(), *_contradiction_clauses(skin.reports)]
+    decisive = [*sensors.values(), *_contradiction_clauses(skin.reports), *_slip_clauses(skin.reports)]
     stated = _sets_in_words(verdict, unexplained, acting, names, in_percent(probability))
     brief = _sets_in_brief(verdict, leader.mechanisms, in_percent(probability))
     first = [*decisive, f"apart from that, {stated}"] if decisive else [stated]
@@ -228,6 +229,16 @@ def _prefixed(reports: Mapping[str, Reported], key: str) -> list[dict[str, Any]]
 
 def _contradiction_clauses(reports: Mapping[str, Reported]) -> list[str]:
     return [f"in {contradiction['statement']}" for contradiction in _prefixed(reports, "contradictions")]
+
+
+def _slip_clauses(reports: Mapping[str, Reported]) -> list[str]:
+    """What was undone or left out in single campaigns, but for the sensors of `_failure_clauses`."""
+    of_sensors = (FindingCode.NO_RESPONSE, FindingCode.WEAK)
+    return [
+        f"in {name}: {words}"
+        for name, report in reports.items()
+        for words in slip_clauses(report.document["findings"], of_sensors)
+    ]
 
 
 def _contradictions_in_brief(reports: Mapping[str, Reported]) -> list[str]:

@@ -24,6 +24,7 @@ import numpy as np
 from underskin.errors import InvalidInput, not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.findings.sentences import DefectKind
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.recordings.frf.spectra import (
@@ -39,7 +40,7 @@ from underskin.recordings.frf.spectra import (
     without_drift,
     without_line,
 )
-from underskin.recordings.frf.stepped_sine import find_steps, settled, step_amplitudes
+from underskin.recordings.frf.stepped_sine import Step, find_steps, settled, step_amplitudes
 from underskin.units import Complexes, Floats, Mask, to_si
 
 _LARGEST = 0.25  # largest lag, of a record
@@ -333,6 +334,7 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         )
     ]  # between the steps a jump is the step itself
     bad = damaged(defects, len(force))
+    defects = [defect for defect in defects if not _is_switch(defect, steps, sample_rate)]
     lines: dict[float, list[tuple[Complexes, Complexes]]] = {}
     for step in steps:
         pair = step_amplitudes(force, charge, sample_rate, step, bad)
@@ -355,6 +357,13 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         values[index], averages[index] = value[0], len(tone)
         coherence[index] = gamma2[0] if len(tone) > 1 else np.nan
     return Frf(frequency, values, coherence, averages, tuple(defects))
+
+
+def _is_switch(defect: Defect, steps: Sequence[Step], sample_rate: float) -> bool:
+    """Whether a jump lies in the last cycle of a step: crossings tell the sample where tones change to a cycle."""
+    ends = (step.last - defect.first_sample for step in steps)
+    cycles = (sample_rate / step.frequency for step in steps)
+    return defect.kind == DefectKind.JUMP and any(0 < left <= cycle for left, cycle in zip(ends, cycles, strict=True))
 
 
 def _samples(defect: Defect, channel: str) -> int:

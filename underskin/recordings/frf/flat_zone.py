@@ -99,7 +99,9 @@ def _above(
     peaks = {
         index: peaks_hz[index]
         for index, row in enumerate(beyond)
-        if np.isfinite(row).any() and np.nanmax(row) > _PEAK - 1
+        if np.isfinite(row).any()
+        and np.nanmax(row) > _PEAK - 1
+        and np.nanargmax(row) < np.flatnonzero(np.isfinite(row))[-1]
     }
     if peaks:
         lowest, highest = min(peaks, key=lambda index: peaks[index]), max(peaks.values())

@@ -1,13 +1,14 @@
 """Whether the gain of a time series changes from one part of it to another.
 
-With F and Q the spectra of force and charge of a block, H the FRF by all blocks, P = H F and s² the power at a line
-that H leaves, let
-    c = Σ Re(conj(P) Q)/s²,  p = Σ |P|²/s²
-over the L lines. If the series has one gain x, relative to H, c = x (p − m) in all blocks, with m ≥ 0 the part of p by
-a steady noise in the force (Bendat and Piersol, Random Data, chapter 6), at most the least p, and at most L, since s²
-holds that noise. Two lines of Hann's window carry the information of one: c has the variance p. Noise is independent
-from line to line, so that the sum of (c − x (p − m))²/p over the blocks is χ² distributed, with more where few blocks
-make H, which is then in part their own noise; a gain that changes moves all lines of a block alike.
+With F and Q the spectra of force and charge of a block, H the FRF by all blocks (H1), P = H F and s² the power at a
+line that H leaves, let
+    c = Σ Re(conj(P) Q)/s²,  p = Σ |P|²/s²,  w = Σ u |P|²/s²
+over the L lines, with u = (1 − γ²)/γ², which is s² over the mean |P|². If a share θ of s² is by a steady noise in the
+force, H is too small by 1 + θu (Bendat and Piersol, Random Data, chapter 6: H2 = (1 + u) H1), and if the series has one
+gain x, relative to the FRF, c = x (p + θ (w − L)) in all blocks, also where the force moves over the lines, as a sweep
+does. Two lines of Hann's window carry the information of one: c has the variance p. Noise is independent from line to
+line, so that the sum of the squares of c less that, over p, is χ² distributed over the blocks, with more where few
+blocks make H, which is then in part their own noise; a gain that changes moves all lines of a block alike.
 """
 
 from dataclasses import dataclass
@@ -43,10 +44,12 @@ def gain_change(force: Complexes, charge: Complexes, middle_s: Floats) -> GainCh
         return None
     response = np.mean(np.conj(force) * charge, axis=0) / np.maximum(power, _TINY) * force
     left = np.maximum(np.mean(np.abs(charge - response) ** 2, axis=0) * count / (count - 1), _TINY)
-    size = np.maximum((np.abs(response) ** 2 / left).sum(axis=1), _TINY)
+    of_lines = np.abs(response) ** 2 / left
+    size = np.maximum(of_lines.sum(axis=1), _TINY)
+    by_noise = (of_lines / np.maximum(of_lines.mean(axis=0), _TINY)).sum(axis=1) - len(power)
     both = ((np.conj(response) * charge).real / left).sum(axis=1)
     gain, weight = both / size, size / size.sum()
-    steady = _steady(both, size, most=float(min(size.min(), len(power))))
+    steady = _steady(both, size, by_noise)
     excess = float(((both - steady) ** 2 / size).sum()) / (count - 2)
     scatter = float(np.sqrt(max(weight @ (gain - weight @ gain) ** 2 - count / size.sum(), 0.0)))
     if excess < _EXCESS or scatter < _LEAST_SCATTER:
@@ -66,12 +69,11 @@ def gain_change(force: Complexes, charge: Complexes, middle_s: Floats) -> GainCh
     return GainChange(scatter, change.lowest, change.highest, float(middle_s[first - 1] + middle_s[first]) / 2, ratio)
 
 
-def _steady(both: Floats, size: Floats, *, most: float) -> Floats:
-    """x (p − m) of the blocks (blocks,), by least squares with 0 ≤ m ≤ `most`."""
-    columns = np.stack([size, np.ones_like(size)], axis=1) / np.sqrt(size)[:, None]
-    slope, offset = np.linalg.lstsq(columns, both / np.sqrt(size), rcond=None)[0]
-    noise = float(np.clip(-offset / slope, 0.0, most)) if slope else 0.0
-    signal = size - noise
+def _steady(both: Floats, size: Floats, by_noise: Floats) -> Floats:
+    """x (p + θ (w − L)) of the blocks (blocks,), by least squares with 0 ≤ θ ≤ 1; `by_noise` is w − L."""
+    columns = np.stack([size, by_noise], axis=1) / np.sqrt(size)[:, None]
+    slope, noise = np.linalg.lstsq(columns, both / np.sqrt(size), rcond=None)[0]
+    signal = size + (float(np.clip(noise / slope, 0.0, 1.0)) if slope else 0.0) * by_noise
     return np.asarray(signal * (signal * both / size).sum() / (signal**2 / size).sum())
 
 

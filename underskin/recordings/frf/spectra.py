@@ -78,6 +78,7 @@ _COARSE = 0.2  # share of samples equal to the one before, above which the level
 _ONE_LEVEL = 1.5
 _BY_CHANCE = 1e-3  # expected number of equally long runs in the whole signal
 _JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
+_ROUNDED = 2.0  # levels: rounding by half a level changes a second difference by so many at most
 _BLOW, _RINGING = 20.0, 6.0  # kurtosis: 1.5 of a sine, 3 of noise, hundreds of a hammer's blow, tens of its ringing
 _AS_SHARP = 0.5  # of a jump: least second difference a period later, where a periodic signal restarts
 _GIVE_OR_TAKE = 2  # samples, since a period need not be a whole number of them
@@ -190,6 +191,8 @@ def defects(channel: str, signal: Floats) -> list[Defect]:
     """
     if len(signal) < 3:
         return []
+    if signal.min() == signal.max():
+        return [Defect(DefectKind.ONE_VALUE, channel, len(signal), 0)]
     rest = _rest(signal)
     clipped = _overload(signal, rest)
     held = _held(signal) & ~clipped & ~rest
@@ -316,18 +319,23 @@ class _LinearResponses:
 
     def of(self, effect: Floats) -> Floats:
         """The part of the effect that follows (samples,)."""
-        from scipy.signal import fftconvolve  # takes 0.3 s to load, which few need
+        return self._through(self._transfer(self._blocks.spectra(effect)))
 
-        impulse = np.fft.fftshift(np.fft.irfft(self._transfer(self._blocks.spectra(effect)), self.size))
-        return np.asarray(fftconvolve(self.cause, impulse)[self.size // 2 : self.size // 2 + len(self.cause)])
-
-    def noise(self, effect: Floats) -> float:
-        """The share of the effect's power that does not follow, at the lines of what does."""
+    def missed_by_noise(self, effect: Floats) -> Floats:
+        """What the response lacks (samples,) if all that does not follow is by noise of the cause: u times the response
+        at each line, u = (1 − γ²)/γ², by which H1 is too small; 0 at lines that do not follow."""
         spectra = self._blocks.spectra(effect)
         transfer = self._transfer(spectra)
         rest = np.mean(np.abs(spectra - transfer * self._spectra) ** 2, axis=0)
         response = np.abs(transfer) ** 2 * self.power
-        return float((rest / np.maximum(rest + response, _TINY)) @ response / max(float(response.sum()), _TINY))
+        follows = rest < (len(spectra) - 1) * response  # γ² above the 1/n that n blocks of noise have
+        return self._through(transfer * np.where(follows, rest / np.maximum(response, _TINY), 0.0))
+
+    def _through(self, transfer: Complexes) -> Floats:
+        from scipy.signal import fftconvolve  # takes 0.3 s to load, which few need
+
+        impulse = np.fft.fftshift(np.fft.irfft(transfer, self.size))
+        return np.asarray(fftconvolve(self.cause, impulse)[self.size // 2 : self.size // 2 + len(self.cause)])
 
 
 _FALLS_BEHIND = 0.02  # up to 2 % d33 is taken as it is
@@ -388,8 +396,9 @@ def _is_limited(force: Floats, charge: Floats) -> bool:
 def _cubic(cause: Floats, effect: Floats, period: int) -> _Cubic:
     """The part of an effect that follows the cube of its linear response x of unit power, c₃x³: a loss of −c₃⟨x⁴⟩.
 
-    Noise of the cause, a share α of the response's power, adds α (3 − ⟨x⁴⟩)⟨x⁴⟩/⟨h²⟩ at most, where h is what the
-    linear response leaves of the cube, and is taken off.
+    Noise n of the cause, normal and independent of the signal, makes x too small by y at most (`missed_by_noise`). As
+    ⟨g(x) n⟩ = ⟨g'(x)⟩⟨n²⟩ (Stein 1981), the rest then has the product ⟨(x³ − 3x) y⟩ with the cube, over ⟨h²⟩ for h,
+    what the linear response leaves of the cube, its coefficient: what that adds to the loss is taken off.
     """
     cause, effect = cause - cause.mean(), effect - effect.mean()
     responses = _LinearResponses(cause, len(cause) // _PARTS, period)
@@ -415,7 +424,8 @@ def _cubic(cause: Floats, effect: Floats, period: int) -> _Cubic:
     fourth, cube = float(np.mean(square**2)), float(np.mean(powers[1] ** 2))
     freedom = max(1 / max(float(share @ share), _TINY) - 1, 1.0)
     chance = stdtr(freedom, coefficients[1] / max(float(np.sqrt(variance)), _TINY))
-    by_noise = responses.noise(effect) * max(3 - fourth, 0.0) * fourth / max(cube, _TINY)
+    missed = responses.missed_by_noise(effect)[middle] / rms
+    by_noise = max(float(np.mean((3 - square) * x[middle] * missed)), 0.0) * fourth / max(cube, _TINY)
     left = cube / max(float(np.mean(square**2 * square)) - fourth**2, _TINY)
     return _Cubic(float(-coefficients[1] * fourth - by_noise), float(chance), left)
 
@@ -429,7 +439,9 @@ def _held(signal: Floats) -> Mask:
     usual, width = float(same.mean()), 2 * _LOCAL + 1
     around = uniform_filter1d(same.astype(float), width)
     level, leap = float(step[step > 0].min(initial=np.inf)), 2 * np.quantile(step, 0.999)
+    levels = np.maximum(np.pad(_around(_curvature(signal), _last_digit), 1, mode="edge"), level)
     for first, count in _runs(same):
+        level = levels[first]
         after = step[first + count - 1] if first + count < len(signal) else 2 * level
         alike = max(usual, around[first + count // 2] - count / width)
         by_chance = usual > _COARSE or len(signal) * alike**count > _BY_CHANCE
@@ -440,17 +452,41 @@ def _held(signal: Floats) -> Mask:
 
 def _jumps(signal: Floats) -> Mask:
     mask = np.zeros(len(signal), dtype=bool)
+    curvature = _curvature(signal)
+    usual, levels = _around(curvature, _usual_size), _around(curvature, _last_digit)
+    mask[1:-1] = (curvature > _JUMP * usual + _ROUNDED * levels) & (usual > 0)
+    return mask
+
+
+def _curvature(signal: Floats) -> Floats:
+    """The magnitude of the second differences, without those of the binary representation of decimal numbers."""
     curvature = np.abs(np.diff(signal, n=2))
-    # Parts of two lengths, so that each length is processed at once: a long series has some ten thousand parts.
+    return np.where(curvature > _ROUNDING * np.abs(signal).max(), curvature, 0.0)
+
+
+def _around(curvature: Floats, summed: Callable[[Floats], Floats]) -> Floats:
+    """The largest of what `summed` gives for the part that each sample lies in and the parts on both sides.
+
+    Parts of two lengths, so that each length is processed at once: a long series has some ten thousand parts.
+    """
     length, longer = divmod(len(curvature), max(1, len(curvature) // _LOCAL))
     parts = np.split(curvature, [longer * (length + 1)])
     sizes = (length + 1, length)
-    medians = [np.median(part.reshape(-1, size), axis=1) for part, size in zip(parts, sizes, strict=True)]
-    usual = 1.4826 * np.concatenate(medians)
+    of_parts = [summed(part.reshape(-1, size)) for part, size in zip(parts, sizes, strict=True)]
+    usual = np.concatenate(of_parts)
     around = np.max([np.roll(usual, shift) for shift in (-1, 0, 1)], axis=0)
-    scale = np.repeat(around, np.repeat(sizes, [len(of_size) for of_size in medians]))
-    mask[1:-1] = (curvature > _JUMP * scale) & (scale > 0)
-    return mask
+    return np.asarray(np.repeat(around, np.repeat(sizes, [len(part) for part in of_parts])))
+
+
+def _usual_size(parts: Floats) -> Floats:
+    return np.asarray(1.4826 * np.median(parts, axis=1))
+
+
+def _last_digit(parts: Floats) -> Floats:
+    """The least second difference, other than 0, of parts (parts, samples): of rounded numbers their last digit, which
+    may change along a series as numbers of some significant digits pass 1; of others next to nothing."""
+    least = np.where(parts > 0, parts, np.inf).min(axis=1, initial=np.inf)
+    return np.where(np.isfinite(least), least, 0.0)
 
 
 def _runs(mask: Mask) -> list[tuple[int, int]]:

@@ -132,11 +132,21 @@ def ungrouped(cell: str) -> str:
     return f"can be {cell.replace(',', '')} or {cell.replace(',', '.', 1)}: write it without a comma"
 
 
+_THOUSANDS = {
+    ",": re.compile(rf"\s*[-+{MINUS}]?\d{{1,3}}(?:\.\d{{3}})+,\d+\s*"),
+    ".": re.compile(rf"\s*[-+{MINUS}]?\d{{1,3}}(?:,\d{{3}})+\.\d+\s*"),
+}
+
+
 def number(cell: str, decimal: str) -> float | None:
-    """The number in a cell, or None where it holds something else."""
-    if decimal == ",":
-        if "." in cell:
+    """The number in a cell, or None where it holds something else; thousands may be separated where a decimal mark
+    behind them leaves no doubt."""
+    mark = "." if decimal == "," else ","
+    if mark in cell:
+        if not _THOUSANDS[decimal].fullmatch(cell):
             return None
+        cell = cell.replace(mark, "")
+    if decimal == ",":
         cell = cell.replace(",", ".")
     if not cell.isascii():
         cell = cell.strip().replace(MINUS, "-")
