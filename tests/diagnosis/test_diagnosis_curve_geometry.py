@@ -78,6 +78,18 @@ def test_blocks_whose_ends_are_bonded(heights_mm: tuple[float, ...]) -> None:
     assert len(blocks) == 1 or modulus_mpa(report) == pytest.approx(1.0, rel=0.05)
 
 
+def test_no_modulus_before_a_relaxation_that_nothing_follows() -> None:
+    """The guide of a stage rubs, which looks like a relaxation faster than the samples follow: E before it, at the end
+    of its search, is not quoted, as E is 1 MPa."""
+    strain = np.concatenate([np.linspace(0.0, 0.2, 150), np.linspace(0.2, 0.0, 150)[1:]])
+    stress = neo_hookean(strain, 4e-3) + 0.05 * 0.26 * np.where(np.arange(299) < 150, 1.0, -1.0)
+    (curve,) = (bench := block(strain, stress)).recordings
+    timed = replace(bench, recordings=(replace(curve, time_s=0.5 * np.arange(299)),))
+    report = diagnosed(timed, "contact_creep")
+    assert "E " not in str(report.headline)
+    assert report.verdict == "ambiguous"
+
+
 def test_pulled_strip_told_without_spheres() -> None:
     """A pulled strip is told of without spheres."""
     strain = -np.linspace(0.0, 2.0, 120)

@@ -23,6 +23,8 @@ def mechanism(name: str, *parameters: dict[str, Any]) -> dict[str, Any]:
     [
         ({"d33": D33}, "Nothing is missing; d33 −30 pC/N (−31 to −29)"),  # kept before reports had `quotable`
         ({"d33": {"quotable": False}}, "Nothing is missing"),
+        ({"remainder": {"percent": 1.81, "over_noise": 7.0}},
+         "No known mechanism is missing, 1.8 % of the force is unexplained"),
         ({"probability": 0.6, "alternatives": [{"mechanisms": ["adhesion"], "probability": 0.3}]},
          "Perhaps nothing is missing (60 %), or adhesion"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", DELAY)]},
