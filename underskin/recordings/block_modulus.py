@@ -108,8 +108,9 @@ def small_strain_modulus(recording: CompressionRecording) -> CompressionModulus:
 
     Rivlin's series, nominal stress = 2 (λ⁻² − λ) (C1 + C2/λ + C3 (I1 − 3) + C4 (I1 − 3)²), E = 6 (C1 + C2) (Rivlin &
     Saunders, Phil. Trans. R. Soc. A 243 (1951) 251), with a zero of the force and slack. It is used where it leaves
-    only noise and explains the whole branch surely better than one modulus does. A frame that gives and an uneven end
-    change the slope as well: the uncertainty contains a uniform value between E so and by one modulus.
+    only noise, with a zero as of a cell, and explains the whole branch surely better than one modulus does. A frame
+    that gives and an uneven end change the slope as well: the uncertainty contains a uniform value between E so and by
+    one modulus.
     """
     plain = of_compression(recording)
     along, load = loading_branch(
@@ -128,7 +129,7 @@ def small_strain_modulus(recording: CompressionRecording) -> CompressionModulus:
     one, line = (_Series(sign, slack, *kind).fitted(strain, binned, noise) for kind in ((1, False), (1, True)))
     series = _Series(sign, slack, 4).fitted(strain, binned, noise)
     sure = len(strain) * float(np.log(min(one.rms, line.rms) / max(series.rms, 1e-300)))  # nats of normal noise
-    if series.rms > AS_NOISE * noise or sure < SURE:
+    if series.rms > AS_NOISE * noise or abs(series.zero) > 1 or sure < SURE:
         return plain
     between = abs(series.modulus - plain.modulus) / np.sqrt(3)
     return replace(
@@ -147,11 +148,13 @@ def small_strain_modulus(recording: CompressionRecording) -> CompressionModulus:
 
 @dataclass(frozen=True)
 class _SeriesFit:
-    """E at no strain and its deviation [Pa], the strain of the foot, and the rms residual [Pa]."""
+    """E at no strain and its deviation [Pa], the strain of the foot, the zero over its deviation, and the rms residual
+    [Pa]."""
 
     modulus: float
     deviation: float
     foot: float
+    zero: float
     rms: float
 
 
@@ -197,7 +200,9 @@ class _Series:
         rms = float(np.sqrt(rest @ rest / max(len(stress) - self.terms - 2, 1)))
         # `_deviation` takes the level as its second column
         around = np.column_stack([columns[:, [0, -1]], columns[:, 1:-1], moved])
-        return _SeriesFit(float(fitted[0]), _deviation(around, max(noise, rms), zero), float(foot), rms)
+        return _SeriesFit(
+            float(fitted[0]), _deviation(around, max(noise, rms), zero), float(foot), float(fitted[-1]) / zero, rms
+        )
 
 
 def compression_modulus(displacement: Floats, force: Floats, height: float, diameter: float) -> CompressionModulus:
