@@ -171,6 +171,26 @@ def test_a_pulled_sample_is_not_called_compressed(palm: Campaign, tmp_path: Path
     assert "compression" not in told.stdout
 
 
+@pytest.mark.parametrize("relaxes", [0.0, 0.3])
+def test_d33_of_a_block_that_relaxes(relaxes: float, palm: Campaign, tmp_path: Path) -> None:
+    """E of a block whose force falls while it is held is that of the time of the press, which is said beside it."""
+    time = np.arange(0.0, 40.0, 0.1)
+    strain = np.minimum(time / 40, 0.1)
+    force = 100.0 * ((1 - strain) ** -2 - (1 - strain)) * (1 - relaxes * (1 - np.exp(-np.maximum(time - 4, 0) / 5)))
+    force = force + 0.02 * np.random.default_rng(1).standard_normal(400)
+    block = CompressionRecording(
+        id="held", sample_height_mm=10.0, sample_diameter_mm=12.0, displacement_mm=10 * strain, force_n=force,
+        time_s=time,
+    )  # fmt: skip
+    (tmp_path / "held.json").write_bytes(json_file.write(replace(palm, recordings=(block,))))
+    told = re.search(
+        r"the force falls by up to (\S+) % while the displacement is held",
+        run("d33", str(tmp_path / "held.json")).stdout,
+    )
+    assert (told is not None) == (relaxes > 0)
+    assert told is None or float(told[1]) == pytest.approx(30, rel=0.1)
+
+
 @pytest.mark.slow
 def test_d33_and_modulus_of_one_campaign(palm: Campaign, tmp_path: Path) -> None:
     strain = np.linspace(0, 0.1, 50)

@@ -10,6 +10,8 @@ import pytest
 import underskin
 from tests.cli.commands import run
 from tests.support.lean_reports import COSTLY, quick_diagnosis
+from underskin.inversion.elastomer import of_campaign
+from underskin.recordings.block_modulus import CompressionModulus
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
 from underskin.units import Floats
 
@@ -68,6 +70,19 @@ def test_pulled_strip_of_either_sign(sign: int) -> None:
     assert holds(report, 0.6)
     turned = [finding for finding in report.findings if finding.code == "sign_flipped"]
     assert ["of one that is pulled" in finding.statement for finding in turned] == ([True] if sign > 0 else [])
+
+
+def test_strip_pulled_beyond_its_height() -> None:
+    """A strip whose pull counts positive, longer than it is high, was not pressed: no slip of units is suspected."""
+    strain, stress = pulled(0.6, 2.0)
+    report = quick_diagnosis(uniaxial(strain, stress))
+    assert report.verdict == "no_mismatch"
+    assert holds(report, 0.6)
+    assert [finding.code for finding in report.findings] == ["sign_flipped"]
+    (found,) = of_campaign(uniaxial(strain, stress))
+    assert isinstance(found.result, CompressionModulus)
+    assert found.result.load == "tension"
+    assert found.result.modulus == pytest.approx(0.6e6, rel=0.02)
 
 
 def test_pressed_block_counted_negative() -> None:

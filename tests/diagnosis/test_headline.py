@@ -9,6 +9,7 @@ from underskin.diagnosis.reporting.headline import first_and_rest
 D33 = {"name": "d33", "unit": "pC/N", "value": -30.0, "low": -31.0, "high": -29.0}
 DELAY = {"name": "delay", "unit": "µs", "value": 14.2, "low": 13.4, "high": 15.1}
 LONG = {**DELAY, "value": -20000.4, "low": -20002.6, "high": -19998.2}
+DRAG = {"name": "drag_coefficient", "unit": "N·s/mm", "value": 5.232e-8, "low": 5.043e-8, "high": 5.428e-8}
 KNOWN = {"name": "youngs_modulus", "unit": "MPa", "value": 2.0, "low": 1.8, "high": 2.2}
 SIGN = [{"code": "sign_flipped", "recording": "r1"}]
 
@@ -22,10 +23,14 @@ def mechanism(name: str, *parameters: dict[str, Any]) -> dict[str, Any]:
     [
         ({"d33": D33}, "Nothing is missing; d33 −30 pC/N (−31 to −29)"),  # kept before reports had `quotable`
         ({"d33": {"quotable": False}}, "Nothing is missing"),
+        ({"remainder": {"percent": 1.81, "over_noise": 7.0}},
+         "No known mechanism is missing, 1.8 % of the force is unexplained"),
         ({"probability": 0.6, "alternatives": [{"mechanisms": ["adhesion"], "probability": 0.3}]},
          "Perhaps nothing is missing (60 %), or adhesion"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", DELAY)]},
          "Timing delay, delay 14.2 µs (13.4–15.1)"),
+        ({"verdict": "explained", "mechanisms": [mechanism("liquid_drag", DRAG)]},
+         "Liquid drag, drag coefficient 52.3 nN·s/mm (50.4–54.3)"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", LONG)]},
          "Timing delay, delay −20000 µs (−20003 to −19998)"),
         ({"verdict": "explained", "mechanisms": [mechanism("timing_delay", {**DELAY, "at_bound": "high"})]},

@@ -10,8 +10,8 @@ from tests.support.blocks import block
 from underskin import InvalidInput
 from underskin.inversion import elastomer
 from underskin.recordings import curve_preparation, plausibility
+from underskin.recordings.block_modulus import CompressionModulus
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, from_dict
-from underskin.recordings.modulus import CompressionModulus
 
 SIGNS = list(product((1, -1), (1, -1)))
 NAMES = ("force_n", "displacement_mm")

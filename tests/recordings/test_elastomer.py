@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.recordings.modulus import compression_modulus, indentation_modulus
+from underskin.inversion.elastomer import of_campaign
+from underskin.recordings.block_modulus import CompressionModulus, compression_modulus
+from underskin.recordings.campaign import from_dict
+from underskin.recordings.modulus import indentation_modulus
 from underskin.units import Floats
 
 HEIGHT, DIAMETER = 10e-3, 10e-3
@@ -141,6 +144,37 @@ def test_interval_of_neo_hookean_samples(pulled: bool, largest: tuple[float, flo
         inside.append(abs(found.modulus - 1e6) < 1.96 * found.uncertainty)
         assert found.uncertainty < 0.06e6
     assert sum(inside) >= 35  # fewer with probability 0.014
+
+
+@pytest.mark.parametrize(
+    ("stretches", "constants", "changes"),
+    [
+        ((1.0, 0.6), (1 / 6, 0.0, 0.15, 0.0), True),  # Yeoh, twice as stiff in the end
+        ((1.0, 0.65), (1 / 9, 1 / 18, 0.0, 0.0), True),  # Mooney and Rivlin
+        ((1.0, 2.5), (1 / 6, 0.0, -0.01, 0.001), True),  # softens first, and stiffens then
+        ((1.0, 0.7), (1 / 6, 0.0, 0.0, 0.0), False),
+    ],
+)
+def test_a_modulus_that_changes_with_strain(
+    stretches: tuple[float, float], constants: tuple[float, ...], changes: bool
+) -> None:
+    """E is that at no strain where a block or strip is no neo-Hookean solid, within its ±, with 0.4 % noise."""
+    stretch = np.linspace(*stretches, 150)
+    invariant = stretch**2 + 2 / stretch - 3
+    series = sum(c * part for c, part in zip(constants, (1.0, 1 / stretch, invariant, invariant**2), strict=True))
+    force = -np.pi / 4 * 10.0**2 * 2 * (stretch - stretch**-2) * series
+    force = force + 4e-3 * np.abs(force).max() * np.random.default_rng(4).standard_normal(150)
+    sample = {
+        "id": "sample", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0,
+        "displacement_mm": (10.0 * (1 - stretch)).tolist(), "force_n": force.tolist(),
+    }  # fmt: skip
+    skin = {"poisson_ratio": 0.5}
+    campaign, _ = from_dict({"schema": "campaign/1", "name": "samples", "skin": skin, "recordings": [sample]})
+    (found,) = of_campaign(campaign)
+    assert isinstance(found.result, CompressionModulus)
+    assert found.result.is_series == changes
+    assert found.result.modulus == pytest.approx(1e6, rel=0.06)
+    assert abs(found.result.modulus - 1e6) < 2 * found.result.uncertainty
 
 
 def test_a_block_that_is_only_pressed_is_in_no_tension() -> None:

@@ -28,9 +28,10 @@ from underskin.inversion.elastomer import RecordingModulus
 from underskin.inversion.invert import Inversion, array_d33_by_other, invert
 from underskin.prediction.answers import OTHER, WORDS
 from underskin.recordings import plausibility, validation
+from underskin.recordings.block_modulus import CompressionModulus
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording
+from underskin.recordings.curve_course import fall_while_held
 from underskin.recordings.frf.estimators import Estimator
-from underskin.recordings.modulus import CompressionModulus
 from underskin.recordings.reading import Reading, join, read_file
 from underskin.recordings.rig_description import RigDescription
 from underskin.surrogate.sigma_table import ContactName, SigmaTable, load_table
@@ -94,8 +95,25 @@ class InvertedFile:
             of_recordings = [part for part in omitted if isinstance(part, Finding) and part.recording]
             notes += left_out_lines((part.recording, part.statement) for part in of_recordings)
             notes += [f"left out: {part.sentence}" for part in omitted if part not in of_recordings]
-        notes += [words for words in (self._of_frame, self._of_platens) if words]
+        notes += [words for words in (self._of_hold, self._of_frame, self._of_platens) if words]
         return notes
+
+    @property
+    def _of_hold(self) -> str:
+        """What E leaves out of a relaxation that a hold shows; empty where that is below its uncertainty."""
+        falls = []
+        results = {modulus.recording: modulus.result for modulus in self.moduli}
+        for curve in self.reading.campaign.curves:
+            result, fall = results[curve.id], fall_while_held(curve)
+            if not isinstance(result, InvalidInput) and fall > result.uncertainty / result.modulus:
+                falls.append(100 * fall)
+        if not falls:
+            return ""
+        return (
+            f"before you quote E: the force falls by up to {in_digits(max(falls), 2)} % while the displacement is "
+            "held, so that E depends on the time: this is between that at once and that at rest, by the speed of the "
+            "press, and diagnose tells both"
+        )
 
     @property
     def _of_frame(self) -> str:

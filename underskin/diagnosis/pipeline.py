@@ -191,7 +191,7 @@ def _pulled_or_pressed(stated: _Searched, other: _Searched) -> tuple[Campaign, K
     plain = theirs.log_weight(theirs.null) - ours.log_total
     if plain < least:
         return *other, is_open
-    arguments = {"pulled": not is_pulled, "less": times_in_words(plain)}
+    arguments = {"pulled": not is_pulled, "why": f"the other way {times_in_words(plain)} less probable"}
     return *other, [Finding(Reason.COUNTED_AS_OTHER_LOAD, curve.id, "force_n", arguments)]
 
 

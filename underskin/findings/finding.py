@@ -240,7 +240,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.UNUSUAL_MEDIAN_FRF: f"FRF, median of the recordings: {_UNUSUAL}",
     Reason.CURVE_COUNTED_NEGATIVE: counted_negative,
     Reason.COUNTED_AS_OTHER_LOAD: "force and displacement are counted as of a sample that is {pulled:pressed|pulled}, "
-    "and the curve is that of one that is {pulled:pulled|pressed} (the other way {less} less probable): turned round "
+    "and the curve is that of one that is {pulled:pulled|pressed} ({why}): turned round "
     "here; compression counts positive and tension negative, so reverse the signs of both channels",
     Reason.PULLED_OR_PRESSED: "whether the sample was {pulled:pulled, as the signs say, or pressed|pressed, as the "
     "signs say, or pulled} is open: the curve could be of either; compression counts positive, tension negative",

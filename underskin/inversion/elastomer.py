@@ -1,5 +1,5 @@
 """The elastomer's modulus from curves of the same bench: a compressed or pulled sample, or an indented one, each
-recording separately (recordings/modulus.py). Curves are prepared by curve_preparation.
+recording separately (recordings/modulus.py, block_modulus.py). Curves are prepared by curve_preparation.
 """
 
 from collections.abc import Callable, Mapping
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from underskin.errors import InvalidInput, unusable
+from underskin.recordings.block_modulus import CompressionModulus, small_strain_modulus
 from underskin.recordings.campaign import (
     Campaign,
     CompressionRecording,
@@ -17,7 +18,7 @@ from underskin.recordings.campaign import (
     SkinDescription,
 )
 from underskin.recordings.curve_preparation import prepared, reject_exchanged_columns
-from underskin.recordings.modulus import CompressionModulus, IndentationModulus, of_compression, of_indentation
+from underskin.recordings.modulus import IndentationModulus, of_indentation
 from underskin.surrogate.hdf5_format import load_contact
 
 
@@ -59,7 +60,7 @@ def _of_indentation(curve: IndentationRecording, skin: SkinDescription) -> Inden
 
 def _of_compression(curve: CompressionRecording, _: SkinDescription) -> CompressionModulus:
     _require_height(curve)
-    return of_compression(curve)
+    return small_strain_modulus(curve)
 
 
 _MODULUS: Mapping[str, Callable[[Any, SkinDescription], CompressionModulus | IndentationModulus]] = {

@@ -118,6 +118,7 @@ _LOW = 0.3  # of the range of force: the foot of a contact
 _AIR_NOISES, LEAST_CONTACT = 4.0, 1e-3  # standard deviations, and of the largest force: less is out of contact
 _LINE = 3  # samples, of which a straight line leaves scatter
 _RISE = 0.02  # of the range of force: below it a sphere has not yet pressed
+_LEAST_HELD = 8  # samples of a hold
 PACE = 0.5  # of the stage's speed: creep is slower
 
 
@@ -405,6 +406,23 @@ def _single_snap(force: Floats, air_force: float, noise: float) -> int | None:
         and force[sample] < force[sample - 1] - _BEYOND_JUMP * noise
     ]
     return fallen[0] if fallen else None
+
+
+def fall_while_held(curve: CurveRecording) -> float:
+    """The share of the force that is lost while the largest displacement is held; 0 without a hold, or within noise."""
+    rows = finite_rows(curve)
+    travel, force = (np.asarray(column, dtype=float)[rows] for column in (curve.displacement_mm, curve.force_n))
+    if len(rows) < _LEAST_HELD:
+        return 0.0
+    top = int(np.argmax(np.abs(force - force[0])))
+    travel, force = (column * (1.0 if force[top] >= force[0] else -1.0) for column in (travel, force))
+    course = curve_landmarks(travel, force)
+    held = force[course.arrive : course.leave + 1] - course.zero
+    if len(held) < _LEAST_HELD or not held.max() > 0:
+        return 0.0
+    few = max(len(held) // 50, 1)
+    lost, noise = held[:few].mean() - held[-few:].mean(), course.noise * np.sqrt(2 / few)
+    return float(lost / held[:few].mean()) if lost > _AIR_NOISES * noise else 0.0
 
 
 def _hold(displacement: Floats, turn: int) -> tuple[int, int]:

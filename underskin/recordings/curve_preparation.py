@@ -57,7 +57,7 @@ class Orientation:
     deep end follows from the stiffness, rather than being assumed from the direction of the first movement.
     `may_be_pulled`: both columns of a block are negative, which is right for tension. `bends_as_other`: a block has the
     signs of one load, and its curve bends as under the other: a solid softens as it is pulled and stiffens as it is
-    pressed, a foam the other way round.
+    pressed, a foam the other way round. `must_be_pulled`: it bends so, and moves farther than its height allows.
     """
 
     negative: tuple[str, ...]
@@ -65,6 +65,7 @@ class Orientation:
     is_deep_end_known: bool
     may_be_pulled: bool = False
     bends_as_other: bool = False
+    must_be_pulled: bool = False
 
 
 _UNKNOWN = Orientation((), np.zeros(0, dtype=np.intp), is_deep_end_known=False)
@@ -76,8 +77,11 @@ def orientation(recording: CurveRecording) -> Orientation:
     oriented = _oriented(force, travel, sphere=recording.has_sphere)
     if recording.signs_checked:
         return replace(oriented, negative=(), may_be_pulled=False, bends_as_other=False)
-    is_pulled = oriented.may_be_pulled and np.nanmax(np.abs(travel)) > _LONGEST * recording.height_mm
-    return replace(oriented, negative=(), may_be_pulled=False) if is_pulled else oriented
+    if not oriented.bends_as_other or not np.nanmax(np.abs(travel)) > _LONGEST * recording.height_mm:
+        return oriented
+    if oriented.may_be_pulled:
+        return replace(oriented, negative=(), may_be_pulled=False)
+    return replace(oriented, negative=(FORCE, TRAVEL), bends_as_other=False, must_be_pulled=True)
 
 
 def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
@@ -220,7 +224,12 @@ def findings(campaign: Campaign) -> list[Finding]:
 
 def _counted(curves: Iterable[tuple[CurveRecording, Orientation]]) -> list[Finding]:
     alike: dict[tuple[str, tuple[str, ...], bool], list[str]] = {}
+    pulled = []
     for curve, oriented in curves:
+        if oriented.must_be_pulled:
+            why = f"no block of {curve.height_mm:.4g} mm is pressed {np.nanmax(np.abs(curve.displacement_mm)):.4g} mm"
+            pulled.append(Finding(Reason.COUNTED_AS_OTHER_LOAD, curve.id, FORCE, {"pulled": True, "why": why}))
+            continue
         alike.setdefault((curve.kind, oriented.negative, oriented.may_be_pulled), []).append(curve.id)
     return [
         Finding(
@@ -231,7 +240,7 @@ def _counted(curves: Iterable[tuple[CurveRecording, Orientation]]) -> list[Findi
         )
         for (_, fields, may_be_pulled), ids in alike.items()
         if fields
-    ]
+    ] + pulled
 
 
 def turned(campaign: Campaign) -> tuple[Campaign, int]:

@@ -36,6 +36,7 @@ from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
 from underskin.mechanisms.registry import ActiveCatalogue
+from underskin.recordings.block_modulus import ZERO_SD
 from underskin.recordings.campaign import (
     Campaign,
     CurveRecording,
@@ -53,7 +54,6 @@ from underskin.recordings.curve_course import (
     samples_of,
 )
 from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.modulus import ZERO_SD
 from underskin.units import Complexes, Floats, Indices, Mask
 
 _LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n")

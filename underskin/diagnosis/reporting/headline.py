@@ -84,14 +84,7 @@ def _answers(report: Document) -> Iterator[str]:
             yield first
         yield "nothing can be concluded from these recordings"
     elif verdict == "no_mismatch":
-        rivals = [_named(rival["mechanisms"]) for rival in _rivals(report)]
-        if (report["probability"] or 0.0) < EXPLAINED and rivals:
-            yield f"perhaps nothing is missing ({probability}), or {' or '.join(rivals)}"
-        yield (
-            "nothing is missing"
-            if (report["probability"] or 0.0) >= EXPLAINED
-            else f"perhaps nothing is missing ({probability})"
-        )
+        yield from _nothing_missing(report, probability)
     elif verdict == "unexplained":
         law = report.get("unnamed")
         if law is not None:
@@ -116,6 +109,21 @@ def _answers(report: Document) -> Iterator[str]:
         )
         yield f"{remaining}, best: {names or 'nothing missing'} ({probability})"
         yield remaining
+
+
+def _nothing_missing(report: Document, probability: str) -> Iterator[str]:
+    """That no mechanism is missing, and what the force keeps besides."""
+    rivals = [_named(rival["mechanisms"]) for rival in _rivals(report)]
+    if (report["probability"] or 0.0) < EXPLAINED and rivals:
+        yield f"perhaps nothing is missing ({probability}), or {' or '.join(rivals)}"
+    remainder = report.get("remainder")
+    if remainder and (report["probability"] or 0.0) >= EXPLAINED:
+        yield f"no known mechanism is missing, {significant(remainder['percent'], 2)} % of the force is unexplained"
+    yield (
+        "nothing is missing"
+        if (report["probability"] or 0.0) >= EXPLAINED
+        else f"perhaps nothing is missing ({probability})"
+    )
 
 
 def _named(names: Sequence[str]) -> str:

@@ -14,6 +14,7 @@ from underskin.diagnosis.reporting import numbers
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import MODULUS_ERROR, hidden_factors, may_hide
 
+_MOST = 0.5  # of the variance of log E: the part that another parameter explains
 _LAW_FACTORS = ("gain", "modulus")  # what an unlisted law acts on as a factor on the force
 
 
@@ -40,9 +41,25 @@ def _log_modulus(problem: FittingProblem, explanation: Explanation) -> NormalMix
     return NormalMixture.joined([mixture.moved(-excess).times(share) for excess, share in hidden])
 
 
+def _search_ended(explanation: Explanation, index: int) -> str | None:
+    """The end of a search that E shares: its own, or that of a parameter which most of its uncertainty follows, as the
+    modulus before a relaxation that is faster than the recording."""
+    parameters, fit = explanation.model.parameters, explanation.point.fit
+    means = explanation.best.hypothesis.mean_indices
+    for span in [slice(index, index + 1), *explanation.spans.values()]:
+        for other in range(span.start, span.stop):
+            side = parameters[other].ends_search(float(fit[other]))
+            if side is None or other not in means:
+                continue
+            variance = explanation.best.covariance_of([index, other])
+            if variance[0, 1] ** 2 > _MOST * variance[0, 0] * variance[1, 1]:
+                return side if variance[0, 1] > 0 else {"low": "high", "high": "low"}[side]
+    return None
+
+
 def _entry(problem: FittingProblem, explanation: Explanation, mixture: NormalMixture) -> dict[str, Any]:
     index = explanation.index("youngs_modulus")
-    at_bound = explanation.model.parameters[index].ends_search(float(explanation.point.fit[index]))
+    at_bound = _search_ended(explanation, index)
     declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is a factor on it
     stated = numbers.of_logarithms(mixture.share / mixture.share.sum(), mixture.mean, mixture.deviation)
     bound = {} if at_bound is None else {"at_bound": at_bound}

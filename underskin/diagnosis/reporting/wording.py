@@ -54,6 +54,7 @@ _FINDINGS = {
     "weak": "weak sensor",
 }  # by code; other codes are words already
 _UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the suffix of an axis' name
+_FIRST_UNIT = re.compile(r"([^·/]+)((?:[·/].+)?)$")
 _POWERS = 1e-4  # below which four digits are written as a power of ten
 _NOT_QUOTED = re.compile(r"d33 is not to be quoted: (.+?)(?:; |\.(?:\s|$))")  # the clause of a report's statement
 
@@ -123,12 +124,14 @@ def interval(parameter: Mapping[str, Any]) -> str:
 
 
 def in_its_unit(parameter: Mapping[str, Any]) -> dict[str, Any]:
-    """A parameter in a readable unit, where its value would be written as a power of ten."""
-    field, ends = FIELD_OF.get(parameter["unit"]), {name: parameter[name] for name in ("value", "low", "high")}
+    """A parameter in a readable unit, where its value would be written as a power of ten; of N·s/mm, in nN·s/mm."""
+    first = _FIRST_UNIT.match(parameter["unit"])
+    field, rest = (FIELD_OF.get(first[1]), first[2]) if first else (None, "")
+    ends = {name: parameter[name] for name in ("value", "low", "high")}
     if field is None or None in ends.values() or (largest := max(map(abs, ends.values()))) >= _POWERS:
         return dict(parameter)
     unit, count = readable_unit(field, largest)
-    return {**parameter, **{name: count * end for name, end in ends.items()}, "unit": unit}
+    return {**parameter, **{name: count * end for name, end in ends.items()}, "unit": unit + rest}
 
 
 def not_quoted(report: Mapping[str, Any]) -> str:

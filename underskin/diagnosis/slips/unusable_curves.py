@@ -10,9 +10,10 @@ from underskin.errors import InvalidInput, too_few, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
+from underskin.recordings.block_modulus import of_compression
 from underskin.recordings.campaign import Campaign, CurveRecording, IndentationRecording, SkinDescription
 from underskin.recordings.curve_preparation import reject_exchanged_columns
-from underskin.recordings.modulus import estimate, of_compression, require_depth, tip_of
+from underskin.recordings.modulus import estimate, require_depth, tip_of
 from underskin.units import Floats, to_si
 
 

@@ -32,6 +32,7 @@ from underskin.mechanisms.models.contact_state import Pickup
 from underskin.mechanisms.models.curve_state import Curve, memories, numbers
 from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.physics.uniaxial import neo_hookean, stiffening
+from underskin.recordings.block_modulus import ZERO_SD, of_compression
 from underskin.recordings.campaign import (
     CompressionConditions,
     CompressionRecording,
@@ -40,7 +41,6 @@ from underskin.recordings.campaign import (
     SkinDescription,
 )
 from underskin.recordings.curve_course import is_one_sided
-from underskin.recordings.modulus import ZERO_SD, of_compression
 from underskin.units import Floats, Indices, Mask, to_si
 
 _STEP = 3e-6  # of a logarithm or of a prior's width
