@@ -15,7 +15,7 @@ from service.store import database, diagnoses
 from service.store.tables import diagnoses as table_of_diagnoses
 from tests.service.backends import on
 from tests.support.diagnosed import asked, awaited, begun, found, report, resonant, sent, small, small_report, table
-from tests.support.lean_reports import BESIDE_SKINS
+from tests.support.lean_reports import BESIDE_SKINS, beside
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import Client, ServiceError, __version__
 
@@ -107,7 +107,7 @@ def test_killed_server_leaves_no_process_takes(place: Place) -> None:
     with running(place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
         first, second = (begun(server, small(), name) for name in ("a", "b"))
         client.campaigns.post(resonant("another", preloads=(1.0,), lines=6, seed=3), skin="b")
-        both = client.skins.diagnose("b", without=BESIDE_SKINS)["id"]
+        both = client.skins.diagnose("b", without=beside("contact_resonance"))["id"]
         awaited(server, first, "running")
         (ready,), (worker,) = await_workers(server, 1, "underskin-ready"), await_workers(server, 1)
         server.kill()
