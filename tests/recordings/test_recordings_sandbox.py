@@ -125,13 +125,13 @@ def compute(_stream: BinaryIO) -> None:
 
 
 def wait(_stream: BinaryIO) -> dict[str, Any]:
-    time.sleep(7)
+    time.sleep(5)
     return {}
 
 
 def test_time_processor_counts_waiting(stream: BinaryIO) -> None:
     """Time on a processor counts and waiting for one does not."""
-    assert call_apart(f"{__name__}:wait", stream, "a", what="TDMS", limits=ParsingLimits(seconds=6.0)) == {}
+    assert call_apart(f"{__name__}:wait", stream, "a", what="TDMS", limits=ParsingLimits(seconds=4.0)) == {}
     with pytest.raises(FileError, match=r"a: reading it as TDMS took more than 1 s and was stopped"):
         call_apart(f"{__name__}:compute", stream, "a", what="TDMS", limits=ParsingLimits(seconds=1.0))
 
