@@ -86,8 +86,7 @@ def test_no_modulus_before_a_relaxation_that_nothing_follows() -> None:
     of its search, is not quoted, as E is 1 MPa."""
     strain = np.concatenate([np.linspace(0.0, 0.2, 150), np.linspace(0.2, 0.0, 150)[1:]])
     stress = neo_hookean(strain, 4e-3) + 0.05 * 0.26 * np.where(np.arange(299) < 150, 1.0, -1.0)
-    (curve,) = (bench := block(strain, stress)).recordings
-    timed = replace(bench, recordings=(replace(curve, time_s=0.5 * np.arange(299)),))
+    timed = block(strain, stress).with_curves(lambda curve: replace(curve, time_s=np.linspace(0.0, 149.0, 299)))
     report = diagnosed(timed, "contact_creep")
     assert "E " not in str(report.headline)
     assert report.verdict == "ambiguous"
