@@ -9,7 +9,6 @@ pick-up weigh less, and the sums are corrected for it.
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache
 from itertools import pairwise
 from typing import Any, ClassVar, Self
 
@@ -56,7 +55,8 @@ class AtPoints:
     shared: ClassVar[Collection[str]] = ()  # the fields that are the same at all points
 
     def _by_points(self) -> dict[str, Any]:
-        return {name: value for name in _names_by_points(type(self)) if (value := getattr(self, name)) is not None}
+        values = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in self.shared}
+        return {name: value for name, value in values.items() if value is not None}
 
     def __getitem__(self, points: Array | slice) -> Self:
         """At some of the points."""
@@ -72,11 +72,6 @@ class AtPoints:
             values = [getattr(part, name) for part in parts]
             joined[name] = value.joined(values) if isinstance(value, AtPoints) else np.concatenate(values)
         return replace(parts[0], **joined)
-
-
-@cache
-def _names_by_points(arrays: type[AtPoints]) -> list[str]:
-    return [field.name for field in fields(arrays) if field.name not in arrays.shared]
 
 
 @dataclass(frozen=True)
