@@ -146,7 +146,7 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> 
     [
         ("", "must have a header of field names and at least one row"),
         ("preload_n,frf_pc_per_n\n", "at least one row"),
-        ("preload_n;frf_pc_per_n\n1;7\n3;1.000,5\n", "frf_pc_per_n[1] = '1.000,5': must be a number"),
+        ("preload_n;frf_pc_per_n\n1;7\n3;1.00,5\n", "frf_pc_per_n[1] = '1.00,5': must be a number"),
         ("preload_n,frf_pc_per_n,humidity\n1,7,40\n", "has the column 'humidity'; allowed, once each"),
         ("prelod_n,frf_pc_per_n\n1,7\n", "has the column 'prelod_n'; did you mean preload_n? Allowed, once each"),
         ("preload_n,frf_magnitude_pc_per_n\n1,7\n", "needs frf_phase_deg or frf_phase_rad with it"),

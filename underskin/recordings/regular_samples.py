@@ -226,8 +226,8 @@ def evenly_sampled(columns: Columns, time: Floats) -> tuple[dict[str, Floats], f
     ends = _gaps(time)
     if len(ends):
         part, note = _longest_without(ends, time)
-        even, rate, further = evenly_sampled({name: column[part] for name, column in columns.items()}, time[part])
-        return even, rate, "; ".join(filter(None, (note, further)))
+        whole, sampled, further = evenly_sampled({name: column[part] for name, column in columns.items()}, time[part])
+        return whole, sampled, "; ".join(filter(None, (note, further)))
     rate = even_rate(time)
     if rate is not None:
         rounded = _rounded_clock(time)
