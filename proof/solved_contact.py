@@ -8,7 +8,9 @@ An answer is
 - `partly`: the law that is in the data, with another that is not;
 - `honest`: nothing is asserted, or an unnamed law is;
 - `wrong`: anything else.
-An effect that does not show and moves d33 by more than the tolerances is a row of its own: no interval can know of it.
+An effect that does not show and moves d33 by more than the tolerances is a row of its own: no absolute interval can
+know of it. Its relative one, which compares sensors and dates of one skin, must hold what the world without the effect
+makes of these recordings, off by a factor that is common to them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -28,6 +30,7 @@ _PLAIN_LAWS = {"layered_contact", "moving_contact_edge"}
 _MOVES = 0.02  # of d33: the tolerance of declared lengths, beyond which an unseen effect is judged by itself
 _UNDECIDED = ("ambiguous", "unexplained", "insufficient_data")
 RIGHT, EQUIVALENT, PARTLY, HONEST, WRONG = "right", "equivalent", "partly", "honest", "wrong"
+MOVED = "of these, d33 moved"
 CLASSES = (RIGHT, EQUIVALENT, PARTLY, HONEST, WRONG)
 
 Report = Mapping[str, Any]
@@ -60,7 +63,8 @@ def compared(truth: Truth, report: Report) -> dict[str, Any]:
     """A report beside the truth."""
     d33 = report.get("d33") or {}
     stated = d33.get("value") is not None and d33.get("low") is not None and d33.get("high") is not None
-    true = truth["d33_pc_per_n"]
+    true, relative = truth["d33_pc_per_n"], d33.get("relative")
+    apparent = true * (1 + truth[f"d33_error_of_{'base' if report['verdict'] == 'no_mismatch' else 'plain_world'}"])
     return {
         "effect": truth["effect"],
         "visible": _visible(truth),
@@ -70,6 +74,7 @@ def compared(truth: Truth, report: Report) -> dict[str, Any]:
         "class": graded(truth, report),
         "quoted": stated and bool(d33["quotable"]),
         "inside": stated and d33["low"] <= true <= d33["high"],
+        "relative_inside": relative is not None and relative["low"] <= apparent <= relative["high"],
         "off": d33["value"] / true - 1 if stated else None,
         "half_width": (d33["high"] - d33["low"]) / (2 * d33["value"]) if stated else None,
         "plain_world_off": truth["d33_error_of_plain_world"],
@@ -98,6 +103,12 @@ def _visible(truth: Truth) -> bool:
     return truth["effect"] != PLAIN and truth["chi2_gain_over_plain_world"] >= VISIBLE
 
 
+def ideally_quoted(judgement: Judgement) -> bool:
+    """Whether a diagnoser that owns the rig's worlds and noise can quote d33: in the plain world, and where the effect
+    shows. An effect that does not show leaves d33 open."""
+    return judgement["effect"] == PLAIN or bool(judgement["visible"])
+
+
 def _names(report: Report) -> tuple[str, ...]:
     if report["verdict"] not in ("explained", "ambiguous"):
         return ()
@@ -113,8 +124,8 @@ def rows(judged: Sequence[Judgement]) -> dict[str, list[Judgement]]:
     subsets["effect shows"] = [judgement for judgement in judged if judgement["visible"]]
     unseen = [judgement for judgement in judged if not judgement["visible"] and judgement["effect"] != PLAIN]
     subsets["effect does not show"] = unseen
-    subsets["of these, d33 moved"] = [judgement for judgement in unseen if abs(judgement["plain_world_off"]) > _MOVES]
-    subsets["all but these"] = [judgement for judgement in judged if judgement not in subsets["of these, d33 moved"]]
+    subsets[MOVED] = [judgement for judgement in unseen if abs(judgement["plain_world_off"]) > _MOVES]
+    subsets["all but these"] = [judgement for judgement in judged if judgement not in subsets[MOVED]]
     subsets["all"] = list(judged)
     return subsets
 

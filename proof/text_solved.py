@@ -7,7 +7,7 @@ import numpy as np
 
 from proof.markdown import table
 from proof.phrases import percent
-from proof.solved_contact import CLASSES, HONEST, RIGHT, WRONG, Judgement, rows
+from proof.solved_contact import CLASSES, HONEST, MOVED, RIGHT, WRONG, Judgement, ideally_quoted, rows
 from proof.statistics import share
 from rig.solved.worlds import PLAIN
 
@@ -18,7 +18,10 @@ def solved_contact(result: Mapping[str, Any]) -> str:
     confident = [judgement for judgement in judged if judgement["class"] != HONEST]
     visible = [judgement["class"] != HONEST for judgement in judged if judgement["visible"]]
     plain = [judgement["class"] == RIGHT for judgement in judged if judgement["effect"] == PLAIN]
-    body = [[name, *_counts(some), *_quoted(some)] for name, some in rows(judged).items() if some]
+    subsets = rows(judged)
+    moved = [judgement["relative_inside"] for judgement in subsets[MOVED] if judgement["quoted"]]
+    ideal = [judgement["quoted"] for judgement in judged if ideally_quoted(judgement)]
+    body = [[name, *_counts(some), *_quoted(some)] for name, some in subsets.items() if some]
     return f"""\
 ## Campaigns made by solving the contact
 
@@ -32,6 +35,10 @@ more than the tolerances is a row of its own: no interval can know of it.
 Plain world named: {percent(share(plain))}. Confident statements that are wrong:
 {percent(share([stated["class"] == WRONG for stated in confident]))}. Where the effect shows, stated with confidence:
 {percent(share(visible))}.
+
+A diagnoser that owns the rig's worlds and noise can quote d33 in the plain world and where the effect shows. Of
+these are quoted here: {percent(share(ideal))}. Where an effect that does not show moves d33, the relative interval of a
+quoted one holds what the world without the effect makes of the recordings: {percent(share(moved))}.
 """
 
 

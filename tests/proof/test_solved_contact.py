@@ -9,7 +9,7 @@ from proof.text_solved import solved_contact
 
 PLAIN: dict[str, Any] = {
     "effect": "plain", "exact_name": None, "nearest_names": [], "d33_pc_per_n": 14.0, "chi2_gain_of_truth": 300.0,
-    "chi2_gain_over_plain_world": 0.0, "d33_error_of_plain_world": 0.0,
+    "chi2_gain_over_plain_world": 0.0, "d33_error_of_plain_world": 0.0, "d33_error_of_base": 0.1,
 }  # fmt: skip
 FOAM: dict[str, Any] = {
     **PLAIN, "effect": "foam", "exact_name": "compressible_layer", "nearest_names": ["interface_slip"],
@@ -63,3 +63,15 @@ def test_quoted_d33() -> None:
     assert [cell.strip() for cell in everything.split("|")[2:8]] == ["3", "2", "0", "0", "1", "0"]
     assert "| 1 of 2: 50 %" in everything
     assert "Confident statements that are wrong:\n0 of 2: 0 %" in page
+    assert "these are quoted here: 2 of 2: 100 %" in page
+
+
+@pytest.mark.parametrize(("verdict", "holds"), [("explained", True), ("no_mismatch", False)])
+def test_relative_d33(verdict: str, holds: bool) -> None:
+    """Of an effect that does not show the relative interval is judged by what the answer's own world makes of it."""
+    truth = {**UNSEEN, "chi2_gain_of_truth": 5.0, "d33_pc_per_n": 16.0, "d33_error_of_plain_world": -0.1}
+    d33 = {"value": 14.4, "low": 13.7, "high": 15.1, "relative": {"low": 14.2, "high": 14.6}, "quotable": True}
+    judged = compared(truth, report(verdict, d33=d33))
+    assert (judged["inside"], judged["relative_inside"]) == (False, holds)
+    page = solved_contact({"seed": 1, "judged": [judged]})
+    assert f"of the recordings: {int(holds)} of 1" in page
