@@ -37,6 +37,7 @@ ZERO_SD = 0.02  # of the largest force: a cell's zero, 0.1 % of its range where 
 _FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
 _SMOOTH = 5  # degree of the polynomial that represents a curve of few points
 _LONGER = 1.15  # ratio of strain ranges beyond which the law of the longer range is chosen
+_DIFFER = 2.0  # standard deviations, by which two numbers differ: 95 %
 _BETTER = 0.8  # ratio of departures below which the line is chosen where both hold equally far
 
 
@@ -108,42 +109,64 @@ def small_strain_modulus(recording: CompressionRecording) -> CompressionModulus:
 
     Rivlin's series, nominal stress = 2 (λ⁻² − λ) (C1 + C2/λ + C3 (I1 − 3) + C4 (I1 − 3)²), E = 6 (C1 + C2) (Rivlin &
     Saunders, Phil. Trans. R. Soc. A 243 (1951) 251), with a zero of the force and slack. It is used where it leaves
-    only noise, with a zero as of a cell, and explains the whole branch surely better than one modulus does. A frame
-    that gives and an uneven end change the slope as well: the uncertainty contains a uniform value between E so and by
-    one modulus.
+    only noise, with a zero as of a cell, and tells E from 0. An uneven end bends the start of a curve as well: without
+    that part, the series must still explain the branch surely better than one modulus does, and give the same E. A
+    frame that gives changes the slope too: the uncertainty contains a uniform value between E so and by one modulus.
     """
     plain = of_compression(recording)
-    along, load = loading_branch(
-        to_si("displacement_mm", recording.displacement_mm), to_si("force_n", recording.force_n)
+    height = float(to_si("sample_height_mm", recording.sample_height_mm))
+    branch = _Branch.of(
+        to_si("displacement_mm", recording.displacement_mm),
+        to_si("force_n", recording.force_n),
+        float(to_si("sample_diameter_mm", recording.sample_diameter_mm)),
     )
-    stress = load / (np.pi / 4 * float(to_si("sample_diameter_mm", recording.sample_diameter_mm)) ** 2)
-    sign = 1.0 if plain.is_pressed else -1.0
-    noise = _noise(along, stress) / np.sqrt(max(1.0, len(along) / _POINTS))
-    foot = float(along[np.abs(load).argmin()])
-    strain, binned = _thinned(
-        sign * (along - foot) / float(to_si("sample_height_mm", recording.sample_height_mm)), sign * stress
-    )
-    if (sign * strain).max() > 1 - _LEAST_STRETCH or len(strain) < 2 * FEWEST:
+    sign, noise, slack = branch.sign, branch.noise, is_one_sided(branch.stress)
+    strain, stress = _thinned(sign * (branch.along - branch.foot) / height, sign * branch.stress)
+    early = int(np.argmax(stress >= _EARLY * stress.max())) if slack else 0  # of both signs, no end comes to bear
+    if (sign * strain).max() > 1 - _LEAST_STRETCH or len(strain) - early < 2 * FEWEST:
         return plain
-    slack = is_one_sided(stress)
-    one, line = (_Series(sign, slack, *kind).fitted(strain, binned, noise) for kind in ((1, False), (1, True)))
-    series = _Series(sign, slack, 4).fitted(strain, binned, noise)
-    sure = len(strain) * float(np.log(min(one.rms, line.rms) / max(series.rms, 1e-300)))  # nats of normal noise
-    if series.rms > AS_NOISE * noise or abs(series.zero) > 1 or sure < SURE:
+    several = _Series(sign, slack, 4)
+    series, later = several.fitted(strain, stress, noise), several.fitted(strain[early:], stress[early:], noise)
+    one = min(_Series(sign, slack, 1, law).fitted(strain[early:], stress[early:], noise).rms for law in (False, True))
+    sure = (len(strain) - early) * float(np.log(one / max(later.rms, 1e-300)))  # nats of normal noise
+    differ = abs(series.modulus - later.modulus) > _DIFFER * np.hypot(series.deviation, later.deviation)
+    if series.rms > AS_NOISE * noise or abs(series.zero) > 1 or sure < SURE or differ:
         return plain
-    between = abs(series.modulus - plain.modulus) / np.sqrt(3)
+    if series.modulus < _DIFFER * series.deviation:
+        return plain
     return replace(
         plain,
         modulus=series.modulus,
-        uncertainty=float(np.hypot(series.deviation, between)),
+        uncertainty=float(np.hypot(series.deviation, (series.modulus - plain.modulus) / np.sqrt(3))),
         first_strain=max(0.0, float(strain[0] - series.foot)) if slack else float(strain[0] - series.foot),
         last_strain=float(strain[-1] - series.foot),
         leaves_at_strain=None,
         leaves_at_stress=None,
         is_straight=False,
-        departure=series.rms / float(np.ptp(binned)),
+        departure=series.rms / float(np.ptp(stress)),
         is_series=True,
     )
+
+
+@dataclass(frozen=True)
+class _Branch:
+    """A loading branch: displacement [m] and nominal stress [Pa] (samples,), 1 where the stress rises or −1, the noise
+    of a mean over a bin [Pa], and the displacement where the stress is about 0."""
+
+    along: Floats
+    stress: Floats
+    sign: float
+    noise: float
+    foot: float
+
+    @staticmethod
+    def of(displacement: Floats, force: Floats, diameter: float) -> "_Branch":
+        """Of a curve [m, N] of a cylinder of this diameter [m]."""
+        along, load = loading_branch(displacement, force)
+        stress = load / (np.pi / 4 * diameter**2)
+        sign = 1.0 if stress[-1] >= stress[0] else -1.0
+        noise = _noise(along, stress) / np.sqrt(max(1.0, len(along) / _POINTS))
+        return _Branch(along, stress, sign, float(noise), float(along[np.abs(load).argmin()]))
 
 
 @dataclass(frozen=True)
@@ -210,11 +233,8 @@ def compression_modulus(displacement: Floats, force: Floats, height: float, diam
 
     Raises InvalidInput where the loading branch has too few points, or does not load.
     """
-    along, load = loading_branch(displacement, force)
-    stress = load / (np.pi / 4 * diameter**2)
-    sign = 1.0 if stress[-1] >= stress[0] else -1.0
-    noise = _noise(along, stress) / np.sqrt(max(1.0, len(along) / _POINTS))
-    foot = float(along[np.abs(load).argmin()])
+    branch = _Branch.of(displacement, force, diameter)
+    along, stress, sign, noise, foot = branch.along, branch.stress, branch.sign, branch.noise, branch.foot
     line = _by_law(along, stress, height, sign, noise, foot, straight=True)
     if (along.max() - foot) / height > 1 - _LEAST_STRETCH:  # displacement beyond the sample's height: a slip of units
         return line
