@@ -58,7 +58,7 @@ class LayerOfUnknownThickness(LayeredContact):
 
 _BETWEEN_SPECIMENS = 0.02  # sd of the logarithm of the modulus from piece to piece of one elastomer
 _EXTRAPOLATION = 0.15  # of the reduction of a modulus extrapolated to no strain: differs so between laws of one fit
-_HIDDEN_PRIOR = 0.4  # prior of a mechanism that cannot show: platens are oiled, as the base law has it, or are not
+_HIDDEN_PRIOR = 0.5  # prior of a mechanism that cannot show: platens are oiled as often as they are not
 MODULUS_ERROR, MODULUS = "modulus_error", ("", "youngs_modulus")
 
 Quantity = tuple[str, str]  # a mechanism, or "", and the name of its parameter

@@ -13,7 +13,6 @@ from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.moving_contact_edge import MovingContactEdge
-from underskin.mechanisms.laws.platen_friction import PlatenFriction, shapes_differ
 
 # "Nothing missing" includes all mechanisms that do not show, hence every other campaign.
 PRIORS = {"nothing_missing": 0.6, "one": 0.252, "two": 0.1, "three": 0.012, "four": 0.001, "none_of_these": 0.035}
@@ -40,13 +39,10 @@ def declared_laws(lines: Lines) -> frozenset[str]:
 
 def even_laws(names: Collection[str], lines: Lines) -> frozenset[str]:
     """The mechanisms that are no guesses in a set of these names, with equal prior odds: those that follow from
-    declared facts, in contact with the layer itself an edge that moves with the load, as it does unless held, and of
-    blocks of several shapes ends that the platens hold, as they do unless oiled."""
+    declared facts, and in contact with the layer itself an edge that moves with the load, as it does unless held."""
     named, edge = lines.mechanisms.named, MovingContactEdge
     moves = LayeredContact.name in names and lines.kind in edge.kinds and edge.name in named
-    held = PlatenFriction.name in named and lines.kind in PlatenFriction.kinds and shapes_differ(lines.campaign)
-    laws = {edge.name: moves, PlatenFriction.name: held}
-    return declared_laws(lines) | frozenset(name for name, is_even in laws.items() if is_even)
+    return declared_laws(lines) | (frozenset({edge.name}) if moves else frozenset())
 
 
 def _even_and_guesses(explanation: Explanation) -> tuple[int, int]:

@@ -9,8 +9,7 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.recordings.campaign import CompressionConditions, Conditions
 
 _LEAST_SHAPE_RATIO = 1.05  # of S²: with a smaller ratio, friction and modulus cannot be separated
-# Of ends that one shape does not show, even quantiles: half of them are bonded, cast or glued onto their plates
-_FRICTIONS = (0.1, 0.3, 0.5, 0.7, 0.9, 1.0, 1.0, 1.0, 1.0, 1.0)
+_FRICTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)  # evenly over its prior, with its ends: bonded ends are no rarity
 _REASON = "from well oiled to bonded: nothing is known beforehand"
 
 
@@ -43,22 +42,11 @@ def hidden_in_modulus(conditions: Conditions) -> Sequence[float]:
 
     Empty where samples of several shapes separate the two.
     """
-    shapes = _shapes(conditions)
-    if not shapes or shapes_differ(conditions):
-        return ()
-    return [float(np.log1p(2 * friction * np.mean(shapes))) for friction in _FRICTIONS]
-
-
-def shapes_differ(conditions: Conditions) -> bool:
-    """Whether the cylinders have shapes that separate friction and modulus."""
-    shapes = _shapes(conditions)
-    return bool(shapes) and max(shapes) > _LEAST_SHAPE_RATIO * min(shapes)
-
-
-def _shapes(conditions: Conditions) -> list[float]:
-    """S² of each cylinder."""
-    return [
+    shapes = [
         (0.25 * recording.sample_diameter_mm / recording.sample_height_mm) ** 2
         for recording in conditions.recordings
         if isinstance(recording, CompressionConditions)
     ]
+    if not shapes or max(shapes) > _LEAST_SHAPE_RATIO * min(shapes):
+        return ()
+    return [float(np.log1p(2 * friction * np.mean(shapes))) for friction in _FRICTIONS]
