@@ -10,6 +10,7 @@ import pytest
 import underskin
 from tests.cli.commands import run
 from tests.support.lean_reports import COSTLY, quick_diagnosis
+from underskin.errors import InvalidInput
 from underskin.inversion.elastomer import of_campaign
 from underskin.recordings.block_modulus import CompressionModulus
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
@@ -83,6 +84,15 @@ def test_strip_pulled_beyond_its_height() -> None:
     assert isinstance(found.result, CompressionModulus)
     assert found.result.load == "tension"
     assert found.result.modulus == pytest.approx(0.6e6, rel=0.02)
+
+
+def test_a_foam_whose_height_is_in_another_unit() -> None:
+    """A foam that softens as it is pressed half its height, stated ten times too small, was not pulled: both readings
+    are named, and no modulus is read."""
+    strain = np.linspace(0, 0.5, 300)
+    (found,) = of_campaign(uniaxial(10 * strain, 0.05 * np.tanh(strain / 0.05) + 0.2 * strain**4))
+    assert isinstance(found.result, InvalidInput)
+    assert all(words in str(found.result) for words in ("sample_height_mm, 40: is that height in mm", "pulled"))
 
 
 def test_pressed_block_counted_negative() -> None:

@@ -31,6 +31,7 @@ from underskin.recordings import plausibility, validation
 from underskin.recordings.block_modulus import CompressionModulus
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording
 from underskin.recordings.curve_course import fall_while_held
+from underskin.recordings.curve_preparation import prepared
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.reading import Reading, join, read_file
 from underskin.recordings.rig_description import RigDescription
@@ -103,7 +104,7 @@ class InvertedFile:
         """What E leaves out of a relaxation that a hold shows; empty where that is below its uncertainty."""
         falls = []
         results = {modulus.recording: modulus.result for modulus in self.moduli}
-        for curve in self.reading.campaign.curves:
+        for curve in prepared(self.reading.campaign).campaign.curves:
             result, fall = results[curve.id], fall_while_held(curve)
             if not isinstance(result, InvalidInput) and fall > result.uncertainty / result.modulus:
                 falls.append(100 * fall)
@@ -111,8 +112,8 @@ class InvertedFile:
             return ""
         return (
             f"before you quote E: the force falls by up to {in_digits(max(falls), 2)} % while the displacement is "
-            "held, so that E depends on the time: this is between that at once and that at rest, by the speed of the "
-            "press, and diagnose tells both"
+            "held: this E lies between the instantaneous and the relaxed one, depending on the speed of the press; "
+            "diagnose gives both"
         )
 
     @property

@@ -77,4 +77,9 @@ def _require_height(recording: CompressionRecording) -> None:
     moved = float(np.max(recording.displacement_mm) - rest)
     if moved >= recording.sample_height_mm:
         height = f"must stay below sample_height_mm, {recording.sample_height_mm:g}"
-        raise unusable("displacement_mm", moved, f"{height}: is it in mm, or exchanged with force_n, or tension?")
+        raise unusable(
+            "displacement_mm",
+            moved,
+            f"{height}: is that height in mm, was the sample pulled (tension counts negative), or is this exchanged "
+            "with force_n?",
+        )

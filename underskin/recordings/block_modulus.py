@@ -115,13 +115,9 @@ def small_strain_modulus(recording: CompressionRecording) -> CompressionModulus:
     """
     plain = of_compression(recording)
     height = float(to_si("sample_height_mm", recording.sample_height_mm))
-    branch = _Branch.of(
-        to_si("displacement_mm", recording.displacement_mm),
-        to_si("force_n", recording.force_n),
-        float(to_si("sample_diameter_mm", recording.sample_diameter_mm)),
-    )
+    branch = _Branch.of_recording(recording)
     sign, noise, slack = branch.sign, branch.noise, is_one_sided(branch.stress)
-    strain, stress = _thinned(sign * (branch.along - branch.foot) / height, sign * branch.stress)
+    strain, stress = branch.thinned(height)
     early = int(np.argmax(stress >= _EARLY * stress.max())) if slack else 0  # of both signs, no end comes to bear
     if (sign * strain).max() > 1 - _LEAST_STRETCH or len(strain) - early < 2 * FEWEST:
         return plain
@@ -148,6 +144,19 @@ def small_strain_modulus(recording: CompressionRecording) -> CompressionModulus:
     )
 
 
+def is_neo_hookean(recording: CompressionRecording) -> bool:
+    """Whether the whole loading branch of a `compression` recording is, within noise, that of a neo-Hookean solid of
+    the stated height and load.
+
+    Raises InvalidInput where the loading branch has too few points, or does not load.
+    """
+    height = float(to_si("sample_height_mm", recording.sample_height_mm))
+    branch = _Branch.of_recording(recording)
+    strain, stress = branch.thinned(height)
+    law = _Series(branch.sign, is_one_sided(branch.stress), 1)
+    return law.fitted(strain, stress, branch.noise).rms <= AS_NOISE * branch.noise
+
+
 @dataclass(frozen=True)
 class _Branch:
     """A loading branch: displacement [m] and nominal stress [Pa] (samples,), 1 where the stress rises or −1, the noise
@@ -167,6 +176,19 @@ class _Branch:
         sign = 1.0 if stress[-1] >= stress[0] else -1.0
         noise = _noise(along, stress) / np.sqrt(max(1.0, len(along) / _POINTS))
         return _Branch(along, stress, sign, float(noise), float(along[np.abs(load).argmin()]))
+
+    @staticmethod
+    def of_recording(recording: CompressionRecording) -> "_Branch":
+        """Of a `compression` recording."""
+        return _Branch.of(
+            to_si("displacement_mm", recording.displacement_mm),
+            to_si("force_n", recording.force_n),
+            float(to_si("sample_diameter_mm", recording.sample_diameter_mm)),
+        )
+
+    def thinned(self, height: float) -> tuple[Floats, Floats]:
+        """Means of strain and stress over equal bins of strain, rising as it is loaded; `height` [m]."""
+        return _thinned(self.sign * (self.along - self.foot) / height, self.sign * self.stress)
 
 
 @dataclass(frozen=True)

@@ -119,6 +119,7 @@ _AIR_NOISES, LEAST_CONTACT = 4.0, 1e-3  # standard deviations, and of the larges
 _LINE = 3  # samples, of which a straight line leaves scatter
 _RISE = 0.02  # of the range of force: below it a sphere has not yet pressed
 _LEAST_HELD = 8  # samples of a hold
+_ROUNDING = 1e-9  # of the range of displacement, in arithmetic
 PACE = 0.5  # of the stage's speed: creep is slower
 
 
@@ -409,7 +410,8 @@ def _single_snap(force: Floats, air_force: float, noise: float) -> int | None:
 
 
 def fall_while_held(curve: CurveRecording) -> float:
-    """The share of the force that is lost while the largest displacement is held; 0 without a hold, or within noise."""
+    """The share of the force that is lost while the largest displacement is held, of a prepared curve; 0 without a hold
+    over which the displacement stays within its noise, or within the noise of the force."""
     rows = finite_rows(curve)
     travel, force = (np.asarray(column, dtype=float)[rows] for column in (curve.displacement_mm, curve.force_n))
     if len(rows) < _LEAST_HELD:
@@ -417,8 +419,10 @@ def fall_while_held(curve: CurveRecording) -> float:
     top = int(np.argmax(np.abs(force - force[0])))
     travel, force = (column * (1.0 if force[top] >= force[0] else -1.0) for column in (travel, force))
     course = curve_landmarks(travel, force)
-    held = force[course.arrive : course.leave + 1] - course.zero
+    rests, held = travel[course.arrive : course.leave + 1], force[course.arrive : course.leave + 1] - course.zero
     if len(held) < _LEAST_HELD or not held.max() > 0:
+        return 0.0
+    if np.std(rests) > _AS_NOISE * roughness(rests) + _ROUNDING * np.ptp(travel):
         return 0.0
     few = max(len(held) // 50, 1)
     lost, noise = held[:few].mean() - held[-few:].mean(), course.noise * np.sqrt(2 / few)

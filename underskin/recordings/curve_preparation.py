@@ -20,10 +20,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.errors import unusable
+from underskin.errors import InvalidInput, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import Campaign, CurveRecording
+from underskin.recordings.block_modulus import is_neo_hookean
+from underskin.recordings.campaign import Campaign, CompressionRecording, CurveRecording
 from underskin.recordings.curve_course import (
     PACE,
     RETURN,
@@ -57,7 +58,8 @@ class Orientation:
     deep end follows from the stiffness, rather than being assumed from the direction of the first movement.
     `may_be_pulled`: both columns of a block are negative, which is right for tension. `bends_as_other`: a block has the
     signs of one load, and its curve bends as under the other: a solid softens as it is pulled and stiffens as it is
-    pressed, a foam the other way round. `must_be_pulled`: it bends so, and moves farther than its height allows.
+    pressed, a foam the other way round. `must_be_pulled`: it bends so, moves farther than its height allows, and is
+    within noise that of a neo-Hookean strip.
     """
 
     negative: tuple[str, ...]
@@ -81,7 +83,17 @@ def orientation(recording: CurveRecording) -> Orientation:
         return oriented
     if oriented.may_be_pulled:
         return replace(oriented, negative=(), may_be_pulled=False)
+    if not _is_strip(with_turned(recording, (FORCE, TRAVEL))):
+        return oriented  # its height may be wrong: what is pressed or pulled so far is refused
     return replace(oriented, negative=(FORCE, TRAVEL), bends_as_other=False, must_be_pulled=True)
+
+
+def _is_strip(recording: CurveRecording) -> bool:
+    """Whether a curve is, within noise, that of a neo-Hookean strip of the stated height."""
+    try:
+        return isinstance(recording, CompressionRecording) and is_neo_hookean(recording)
+    except InvalidInput:
+        return False
 
 
 def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
