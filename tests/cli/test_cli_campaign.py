@@ -171,12 +171,15 @@ def test_a_pulled_sample_is_not_called_compressed(palm: Campaign, tmp_path: Path
     assert "compression" not in told.stdout
 
 
-@pytest.mark.parametrize("relaxes", [0.0, 0.3])
-def test_d33_of_a_block_that_relaxes(relaxes: float, palm: Campaign, tmp_path: Path) -> None:
-    """E of a block whose force falls while it is held is that of the time of the press, which is said beside it."""
+@pytest.mark.parametrize(("relaxes", "sign", "held"), [(0.0, 1, True), (0.3, -1, True), (0.0, 1, False)])
+def test_d33_of_a_block_that_relaxes(relaxes: float, sign: int, held: bool, palm: Campaign, tmp_path: Path) -> None:
+    """E of a block whose force falls while it is held, of either sign, lies between two moduli, which is said with it;
+    where it is not held, as in half a period of a sine, its force falls as it turns."""
     time = np.arange(0.0, 40.0, 0.1)
-    strain = np.minimum(time / 40, 0.1)
-    force = 100.0 * ((1 - strain) ** -2 - (1 - strain)) * (1 - relaxes * (1 - np.exp(-np.maximum(time - 4, 0) / 5)))
+    strain = np.minimum(time / 40, 0.1) if held else 0.1 * np.sin(np.pi * time / time[-1])
+    force = (
+        sign * 100.0 * ((1 - strain) ** -2 - (1 - strain)) * (1 - relaxes * (1 - np.exp(-np.maximum(time - 4, 0) / 5)))
+    )
     force = force + 0.02 * np.random.default_rng(1).standard_normal(400)
     block = CompressionRecording(
         id="held", sample_height_mm=10.0, sample_diameter_mm=12.0, displacement_mm=10 * strain, force_n=force,

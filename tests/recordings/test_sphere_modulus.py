@@ -55,7 +55,7 @@ def test_declared_thickness_gives_layer_s_law(depth_mm: float) -> None:
     assert f"{depth_mm / 2:.2g} of the thickness" in found.statement
     on_half_space = result(campaign(depth, force))  # which nobody declared otherwise
     assert on_half_space.modulus > 1.3e6
-    assert "times the noise: the law is not all" in on_half_space.statement
+    assert "times the noise: the law is incomplete" in on_half_space.statement
     assert "times the noise" not in found.statement
 
 

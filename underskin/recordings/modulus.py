@@ -100,7 +100,7 @@ class IndentationModulus:
             else ""
         )
         times = self.residual / self.noise if self.noise > 0 else 0.0
-        misses = f", {times:.2g} times the noise: the law is not all" if times > AS_NOISE else ""
+        misses = f", {times:.2g} times the noise: the law is incomplete" if times > AS_NOISE else ""
         return (
             f"sphere on a {self._body}, contact from {contact:.4g} mm, pressed {over} deep; it leaves "
             f"{self.residual:.2g} N (root mean square{misses}){strain}"

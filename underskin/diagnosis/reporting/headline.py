@@ -116,14 +116,14 @@ def _nothing_missing(report: Document, probability: str) -> Iterator[str]:
     rivals = [_named(rival["mechanisms"]) for rival in _rivals(report)]
     if (report["probability"] or 0.0) < EXPLAINED and rivals:
         yield f"perhaps nothing is missing ({probability}), or {' or '.join(rivals)}"
-    remainder = report.get("remainder")
-    if remainder and (report["probability"] or 0.0) >= EXPLAINED:
-        yield f"no known mechanism is missing, {significant(remainder['percent'], 2)} % of the force is unexplained"
-    yield (
-        "nothing is missing"
-        if (report["probability"] or 0.0) >= EXPLAINED
-        else f"perhaps nothing is missing ({probability})"
-    )
+    if (report["probability"] or 0.0) < EXPLAINED:
+        yield f"perhaps nothing is missing ({probability})"
+    elif remainder := report.get("remainder"):
+        percent = significant(remainder["percent"], 2)
+        yield f"no known mechanism is missing, {percent} % of the force is unexplained"
+        yield f"{percent} % of the force is unexplained"
+    else:
+        yield "nothing is missing"
 
 
 def _named(names: Sequence[str]) -> str:
