@@ -6,9 +6,11 @@ line that H leaves, let
 over the L lines, with u = (1 − γ²)/γ², which is s² over the mean |P|². If a share θ of s² is by a steady noise in the
 force, H is too small by 1 + θu (Bendat and Piersol, Random Data, chapter 6: H2 = (1 + u) H1), and if the series has one
 gain x, relative to the FRF, c = x (p + θ (w − L)) in all blocks, also where the force moves over the lines, as a sweep
-does. Two lines of Hann's window carry the information of one: c has the variance p. Noise is independent from line to
-line, so that the sum of the squares of c less that, over p, is χ² distributed over the blocks, with more where few
-blocks make H, which is then in part their own noise; a gain that changes moves all lines of a block alike.
+does. A few blows in much noise leave u of a line too uncertain for that; their force has the same lines each time, so
+that c = x (p − m), with m at most L and the least p. Two lines of Hann's window carry the information of one: c has
+the variance p. Noise is independent from line to line, so that the sum of the squares of c less that, over p, is χ²
+distributed over the blocks, with more where few blocks make H, which is then in part their own noise; a gain that
+changes moves all lines of a block alike, and fits neither.
 """
 
 from dataclasses import dataclass
@@ -49,8 +51,9 @@ def gain_change(force: Complexes, charge: Complexes, middle_s: Floats) -> GainCh
     by_noise = (of_lines / np.maximum(of_lines.mean(axis=0), _TINY)).sum(axis=1) - len(power)
     both = ((np.conj(response) * charge).real / left).sum(axis=1)
     gain, weight = both / size, size / size.sum()
-    steady = _steady(both, size, by_noise)
-    excess = float(((both - steady) ** 2 / size).sum()) / (count - 2)
+    same_lines = min(float(size.min()), len(power))
+    steady = (_steady(both, size, by_noise, 1.0), _steady(both, size, -np.ones(count), same_lines))
+    excess = min(float(((both - expected) ** 2 / size).sum()) for expected in steady) / (count - 2)
     scatter = float(np.sqrt(max(weight @ (gain - weight @ gain) ** 2 - count / size.sum(), 0.0)))
     if excess < _EXCESS or scatter < _LEAST_SCATTER:
         return None
@@ -69,11 +72,11 @@ def gain_change(force: Complexes, charge: Complexes, middle_s: Floats) -> GainCh
     return GainChange(scatter, change.lowest, change.highest, float(middle_s[first - 1] + middle_s[first]) / 2, ratio)
 
 
-def _steady(both: Floats, size: Floats, by_noise: Floats) -> Floats:
-    """x (p + θ (w − L)) of the blocks (blocks,), by least squares with 0 ≤ θ ≤ 1; `by_noise` is w − L."""
+def _steady(both: Floats, size: Floats, by_noise: Floats, most: float) -> Floats:
+    """x (p + θ `by_noise`) of the blocks (blocks,), by least squares with 0 ≤ θ ≤ `most`."""
     columns = np.stack([size, by_noise], axis=1) / np.sqrt(size)[:, None]
     slope, noise = np.linalg.lstsq(columns, both / np.sqrt(size), rcond=None)[0]
-    signal = size + (float(np.clip(noise / slope, 0.0, 1.0)) if slope else 0.0) * by_noise
+    signal = size + (float(np.clip(noise / slope, 0.0, most)) if slope else 0.0) * by_noise
     return np.asarray(signal * (signal * both / size).sum() / (signal**2 / size).sum())
 
 
