@@ -120,8 +120,8 @@ Columns = Mapping[str, Floats]
 _JITTER = 0.01  # of a step: less has no effect on a spectrum
 _FINE = 0.2  # of a step: a clock's last digit that still tells a lost sample from rounding
 _COARSE = (
-    "the last digit of the clock is up to {:.2g} times a step: the rate is that of the line through all times, and a lost "
-    "sample would not show"
+    "the last digit of the clock is up to {:.2g} times a step: the rate is that of the line through all times, and a "
+    "lost sample would not show"
 )
 _AS_COARSE_AS_A_STEP = (
     "samples are not evenly spaced by their times, of which the last digit is as coarse as a step, so that neither the "
@@ -283,7 +283,9 @@ def _longest_without(ends: Indices, time: Floats, too_coarse: bool) -> tuple[sli
     part = slice(int(starts[longest]), int(stops[longest]))
     if too_coarse and part.stop - part.start < max(_HALF * len(time), 1 / _KNOWN_RATE):
         raise ValueError(_AS_COARSE_AS_A_STEP)
-    gaps = f"the clock misses {missing} {'sample' if missing == 1 else 'samples'}, the first after {time[ends[0]]:.6g} s"
+    gaps = (
+        f"the clock misses {missing} {'sample' if missing == 1 else 'samples'}, the first after {time[ends[0]]:.6g} s"
+    )
     whole = f"the longest part without a gap has {part.stop - part.start} of {len(time)}"
     if part.stop - part.start < _HALF * len(time):
         raise ValueError(f"{gaps}; {whole}, less than half: record again without losing samples")
