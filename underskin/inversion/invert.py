@@ -164,7 +164,8 @@ def _silent(sensor: Indices, d33: Floats, deviation: Floats) -> Mask:
     """The recordings (recordings,) that none of the sensor's response explains, or the opposite, and not noise.
 
     With m the d33 of a sensor for which each of its recordings lies nearest to m, 0 or −m, by the sum of squares over
-    the variances s² (`deviation`, and at least the scatter about m), d is silent where 0 is more likely than m by ln(N/α) nats,
+    the variances s² (`deviation`, and at least the scatter about m), d is silent where 0 is more likely than m by
+    ln(N/α) nats,
         (d − m)² − d² > 2 s² ln(N/α),
     for N recordings: noise alone then makes one so in less than α of arrays, since d is |d − m| > 2 s √(ln(N/α)/2) off
     for any m. A sensor with fewer than half of its recordings and than a median needs at m has none.
