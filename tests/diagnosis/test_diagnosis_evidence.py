@@ -1,6 +1,8 @@
 """The evidence of a hypothesis: its likelihood against a dense covariance matrix, its integral by Laplace's method
 against importance sampling and nested sampling."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
@@ -95,6 +97,44 @@ def test_likelihood_whole_covariance_matrix(made: Made, has_position_scatter: bo
     several = fitter.levels(at.points.covariance[:, None])
     each = log_likelihoods(fitter.lines, curvature, at.products, several, at.points.sensor_log_gain)
     assert each[0, 0] == pytest.approx(exact - shared, abs=1e-6 * abs(exact))
+
+
+GRADIENTS = [
+    Made(("contact_resonance",), (2.0, 0.05), lines=6, preloads_n=(0.5,), highest_hz=900.0),
+    Made(("moving_contact_edge",), (0.7,), lines=4, preloads_n=(0.5, 2.0)),
+]
+
+
+@pytest.mark.parametrize("made", GRADIENTS)
+def test_gradient_by_differences(made: Made, table: SigmaTable) -> None:
+    """The gradient of the log likelihood by each parameter is the limit of its differences, away from the optimum,
+    without sensors' gains and scatter of positions, about which it is linearised."""
+    problem = FittingProblem(lines(campaign(made, table)), table)
+    hypothesis = problem.hypothesis(made.mechanisms, has_position_scatter=False, all_lines=True)
+    own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, made.parameters, strict=False)]
+    fitter = Fitter(hypothesis)
+    initial = fitter.initial(np.array([own]), slopes=True).points
+    random, margin = np.random.default_rng(0), 1e-3 * (fitter.high - fitter.low)
+    beside = initial.fit + random.normal(0, 0.02, initial.fit.shape)
+    points = replace(
+        initial,
+        fit=np.clip(beside, fitter.low + margin, fitter.high - margin),
+        sensor_log_gain=np.zeros_like(initial.sensor_log_gain),
+    )
+
+    def likelihood(fit: Floats) -> float:
+        moved = replace(points, fit=fit)
+        products = fitter.products(moved, slopes=False, place=False)
+        levels = fitter.levels(moved.covariance[:, None])
+        return float(log_likelihoods(fitter.lines, fitter.curvature, products, levels, moved.sensor_log_gain)[0, 0])
+
+    products = fitter.products(points, slopes=True, place=False)
+    _, gradient = fitter.tangent(points, products).normal_equations
+    for index in np.flatnonzero(fitter.free).tolist():
+        step = np.zeros_like(points.fit)
+        step[0, index] = 1e-5 * max(1.0, abs(points.fit[0, index]))
+        difference = (likelihood(points.fit + step) - likelihood(points.fit - step)) / (2 * step[0, index])
+        assert gradient[0, index] == pytest.approx(difference, rel=1e-4, abs=1e-4), hypothesis.model.parameters[index]
 
 
 def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable) -> Evidence:

@@ -153,6 +153,24 @@ def test_sensor_that_failed_on_one_date(table: SigmaTable, change: str, said: st
     assert all(said in left.sentence for left in found.left_out)
 
 
+@pytest.mark.parametrize("share", [0.2, 0.3, 0.4])
+def test_noise_alone_makes_no_sensor_dead(table: SigmaTable, share: float) -> None:
+    """Recordings whose d33 noise changes by a good part of it are all used, so that their mean is unbiased."""
+    random = np.random.default_rng(2)
+    campaign = simulate(table, Rig(d33=np.full(6, 14.0)), random)
+    recordings = []
+    for recording in campaign.of(FrfRecording):
+        assert recording.frf_re_pc_per_n is not None
+        real = recording.frf_re_pc_per_n
+        noise = share * np.abs(real).mean() * np.sqrt(len(real)) * random.standard_normal(len(real))
+        recordings.append(replace(recording, frf_re_pc_per_n=real + noise))
+    found = invert(replace(campaign, recordings=tuple(recordings)), table, (1.0, 130.0))
+    assert found.left_out == ()
+    assert found.campaign_d33 is not None
+    error = 14e-12 * share / np.sqrt(len(recordings))
+    assert float(found.campaign_d33.value) == pytest.approx(14e-12, abs=3 * error)
+
+
 def test_steady_noise_of_the_force_under_a_sweep() -> None:
     """Noise in the force of a slow sweep, whose lines it biases unequally, is no gain that changes: it is taken off."""
     random, rate, samples = np.random.default_rng(5), 1000.0, 16_384

@@ -83,6 +83,7 @@ def test_wheel_holds_library_tables_alone(wheel: Path) -> None:
 
 def test_environment_wheel_requires(fresh: Environment) -> None:
     """The environment has what the wheel requires and no more, and every module is imported there."""
+    assert fresh.pip("check") == "No broken requirements found.\n"
     done = fresh.python(IMPORT_ALL)
     assert done.returncode == 0, done.stderr
     diagnoses, installed = json.loads(done.stdout)

@@ -1,5 +1,7 @@
 """Cells and lines of text files that would be lost or misread without a word: read as meant, or refused by place."""
 
+import re
+
 import pytest
 
 from underskin.errors import FileError, InvalidInput
@@ -103,8 +105,9 @@ def test_thousands_before_a_decimal_mark() -> None:
     for text, mark, cell in ((semicolons, ";", "16.016,25"), (tabs, "\t", "16,016.25")):
         in_kpa = changed(f"skin.youngs_modulus_mpa{mark}16\n", f"skin.youngs_modulus [kPa]{mark}{cell}\n", text)
         assert read(in_kpa).campaign.skin.youngs_modulus_mpa == pytest.approx(16.01625)
-    with pytest.raises(InvalidInput, match=r"'1\.01,25': must be a number"):
-        read(changed(";16\n", ";1.01,25\n", semicolons))
+    for cell in ("1.01,25", "0.016,25", "016.016,25"):  # no thousands begin with 0
+        with pytest.raises(InvalidInput, match=rf"'{re.escape(cell)}': must be a number"):
+            read(changed(";16\n", f";{cell}\n", semicolons))
 
 
 def test_decimal_point_among_decimal_commas() -> None:

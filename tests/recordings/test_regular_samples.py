@@ -160,10 +160,19 @@ def test_of_a_clock_with_gaps_the_longest_part_is_used(lost: list[int]) -> None:
     assert (np.diff(columns["force_n"]) == 1).all()
     assert len(columns["force_n"]) >= len(time) / 2
     assert rate == pytest.approx(1000.0, rel=1e-6)
-    assert f"the clock misses {len(lost)} samples, the first after {time[lost[0] - 1]:.6g} s" in note
-    many = np.delete(time, np.arange(500, len(time), 500))
+    samples = "1 sample" if len(lost) == 1 else f"{len(lost)} samples"
+    assert f"the clock misses {samples}, the first after {time[lost[0] - 1]:.6g} s" in note
+    many = np.delete(time, [100, 600, 700, 1400, 1500, 2500])
     with pytest.raises(ValueError, match=r"the clock misses .* less than half: record again"):
         evenly_sampled({"force_n": np.ones(len(many))}, many)
+
+
+@pytest.mark.parametrize("rate", [600.0, 700.0, 800.0, 950.0, 990.0, 997.0, 999.0, 1300.0])
+def test_a_clock_as_coarse_as_a_step_is_not_accused_of_gaps(rate: float) -> None:
+    """Of even times printed in milliseconds none is missing: more digits, or the rate, are asked for."""
+    time = np.round(np.arange(3000) / rate, 3)
+    with pytest.raises(ValueError, match=r"as coarse as a step.* more digits, or state sample_rate_hz"):
+        evenly_sampled({"force_n": np.ones(len(time))}, time)
 
 
 @pytest.mark.parametrize("change", ["a time comes twice", "two clocks", "backwards"])

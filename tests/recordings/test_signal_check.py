@@ -56,6 +56,17 @@ def test_tones_that_change_at_any_phase_are_whole() -> None:
     assert rms_error(frf) < 0.01
 
 
+@pytest.mark.parametrize("lost", [11_950, 15_900])
+def test_samples_lost_in_the_last_cycle_of_a_tone(lost: int) -> None:
+    """Before the jump to the next tone, or where none follows, lost samples are told apart from that jump."""
+    time = np.arange(4000) / RATE
+    force = 2.0 + 0.09 * np.concatenate([np.sin(2 * np.pi * hz * time) for hz in (3.1, 3.98, 5.98, 12.1)])
+    force, charge = (np.delete(signal, slice(lost, lost + 4)) for signal in (force, answer_to(force)))
+    found = stepped_sine(force, charge, RATE).defects
+    assert {defect.channel for defect in found} == {"force_n", "charge_pc"}
+    assert all(abs(defect.first_sample - lost) < 3 for defect in found)
+
+
 def test_a_channel_of_one_value_is_not_connected() -> None:
     """A charge that never changes is no charge of which samples were dropped."""
     force, _ = shaken(3, samples=4000)

@@ -39,7 +39,6 @@ from underskin.inversion.sensor_flags import (
     difference_flags,
     is_alive,
     population_flags,
-    responds,
     typical_size,
     without_groups,
 )
@@ -132,7 +131,6 @@ def _curvature(residual: Floats, preload: Floats, expected: Floats) -> tuple[flo
 
 
 _FAR = 8.0  # deviations
-_MISSING = 3.0  # deviations: the least that a response differs from none
 _LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are considered
 
 
@@ -140,34 +138,57 @@ def outlying(rows: "RecordingD33", position: Floats) -> Indices:
     """The recordings inside that lie more than 8 robust deviations from their sensor's d33, less the effect of their
     condition; `position` (recordings,): the relative deviation of each for a sphere misplaced as far as is usual.
 
-    A sensor may have been dead, or inverted, on one of several dates: where it responds in half of its recordings or
-    enough for a median, its d33 is that of these, and no usual misplacement hides the others. Where all recordings of a
-    sensor are far, it is off and none of its recordings is an outlier.
+    A sensor may have been dead, or inverted, on one of several dates: its d33 is that of the recordings that are not
+    `_silent`, and no usual misplacement hides those that are. Where all recordings of a sensor are far, it is off and
+    none of its recordings is an outlier.
     """
     good = np.flatnonzero(rows.inside)
     sensor, d33 = rows.sensor[good], rows.d33[good]
     array = typical_size(d33)
-    usual = _usual(sensor, responds(d33, rows.d33_uncertainty[good]))
-    relative = _over_usual(sensor, d33, usual, array)
-    residual = relative - _common(sensor, rows.condition[good], relative, float(np.median(relative)))
-    scatter = ROBUST * float(np.median(np.abs(residual)))
     expected = np.hypot(np.hypot(_LEAST_DEVIATION, position[good]), rows.d33_uncertainty[good] / array)
-    far: Mask = np.abs(residual) > _FAR * np.maximum(scatter, expected)
-    far |= ~usual & (_MISSING * expected < 1)
+    silent: Mask = np.zeros(len(good), dtype=bool)
+    for _ in range(2):  # noise may be more than each recording's lines tell: the scatter decides what is silent
+        relative = _over_usual(sensor, d33, ~silent, array)
+        residual = relative - _common(sensor, rows.condition[good], relative, float(np.median(relative)))
+        deviation = np.maximum(ROBUST * float(np.median(np.abs(residual))), expected)
+        silent = _silent(sensor, d33, deviation * array)
+    far: Mask = np.abs(residual) > _FAR * deviation
+    far |= silent & (relative < -residual)  # nearer to none than to what the others have of its condition
     for index in np.unique(sensor[far]):
         if far[sensor == index].all():
             far[sensor == index] = False
     return good[far]
 
 
-def _usual(sensor: Indices, responding: Mask) -> Mask:
-    """The recordings of which a sensor's d33 is the median: the `responding` ones, or all where these are few."""
-    usual = responding.copy()
+def _silent(sensor: Indices, d33: Floats, deviation: Floats) -> Mask:
+    """The recordings (recordings,) that none of the sensor's response explains, or the opposite, and not noise.
+
+    With m the d33 of a sensor for which each of its recordings lies nearest to m, 0 or −m, by the sum of squares over
+    the variances s² (`deviation`, and at least the scatter about m), d is silent where 0 is more likely than m by
+    ln(N/α) nats,
+        (d − m)² − d² > 2 s² ln(N/α),
+    for N recordings: noise alone then makes one so in less than α of arrays, since d is |d − m| > 2 s √(ln(N/α)/2) off
+    for any m. A sensor with fewer than half of its recordings and than a median needs at m has none.
+    """
+    silent = np.zeros(len(d33), dtype=bool)
+    signed = d33 * (1.0 if np.median(d33) >= 0 else -1.0)
+    least = 2 * np.log(len(d33) / _FALSE_ALARMS)
     for index in np.unique(sensor):
         same = sensor == index
-        if usual[same].sum() < ENOUGH and 2 * usual[same].sum() < same.sum():
-            usual[same] = True
-    return usual
+        value, weight = signed[same], 1 / deviation[same] ** 2
+        levels = value[value > 0]
+        if not len(levels):
+            continue
+        nearest = np.min([(value - sign * levels[:, None]) ** 2 for sign in (-1, 0, 1)], axis=0)
+        level = levels[np.argmin(nearest @ weight)]
+        at_level = value > level / 2
+        level = np.average(value[at_level], weights=weight[at_level])
+        own_scatter = ROBUST * float(np.median(np.abs(value[at_level] - level)))
+        of_sensor = (value - level) ** 2 - value**2 > least * np.maximum(deviation[same], own_scatter) ** 2
+        responding = np.count_nonzero(~of_sensor)
+        if responding >= ENOUGH or 2 * responding >= len(value):
+            silent[same] = of_sensor
+    return silent
 
 
 def _over_usual(sensor: Indices, d33: Floats, usual: Mask, array: float) -> Floats:

@@ -63,12 +63,6 @@ def is_alive(value: Floats, deviation: Floats) -> Mask:
     return np.asarray(size > np.maximum(_DEAD * _typical(size, deviation), 3 * deviation))
 
 
-def responds(d33: Floats, noise: Floats) -> Mask:
-    """Which recordings (recordings,) respond, with the sign of most."""
-    alive = is_alive(d33, noise)
-    return alive & (d33 * np.sum(np.sign(d33[alive])) >= 0)
-
-
 def _typical(size: Floats, deviation: Floats) -> float:
     """The median of values beyond noise; of all where none is, NaN without any."""
     beyond = size > 3 * deviation

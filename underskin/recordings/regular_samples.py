@@ -120,8 +120,12 @@ Columns = Mapping[str, Floats]
 _JITTER = 0.01  # of a step: less has no effect on a spectrum
 _FINE = 0.2  # of a step: a clock's last digit that still tells a lost sample from rounding
 _COARSE = (
-    "the last digit of the clock is up to {:.2g} steps: the rate is that of the line through all times, and a lost "
-    "sample would not show"
+    "the last digit of the clock is up to {:.2g} times a step: the rate is that of the line through all times, and a "
+    "lost sample would not show"
+)
+_AS_COARSE_AS_A_STEP = (
+    "samples are not evenly spaced by their times, of which the last digit is as coarse as a step, so that neither the "
+    "rate nor lost samples show: write the times with more digits, or state sample_rate_hz in the rig description"
 )
 _REPEATED = (
     2  # steps of a last digit from which on times repeat; below, down to half, rounding looks like a lost sample
@@ -147,12 +151,12 @@ def even_rate(time: Floats) -> float | None:
     if step > 0 and jitter <= _JITTER * step:
         return 1 / step
     rounded = _rounded_clock(time)
-    return None if rounded is None else 1 / rounded[0]
+    return None if rounded is None or _hides_gaps(*rounded) else 1 / rounded[0]
 
 
 def _rounded_clock(time: Floats) -> tuple[float, float] | None:
     """The step between even samples whose printed times are `time`, and the coarsest last digit; None where no even
-    clock has these times, or where they leave its rate open.
+    clock has these times, or where they leave its rate open but for the samples that it may hide (`_hides_gaps`).
 
     The times have one number of decimals, or of significant digits. Step and start are those of the line through them,
     weighted by their digits; each time is within its last digit of the line.
@@ -166,11 +170,15 @@ def _rounded_clock(time: Floats) -> tuple[float, float] | None:
         with np.errstate(all="ignore"):
             off = np.abs(time - start - step * np.arange(len(time)))
             jumps = np.abs(np.diff(time) - step) / np.maximum(digits[1:], digits[:-1])
-        hides_gaps = _HALF * step < coarsest < _REPEATED * step
         fits = step > 0 and (off <= digits).all() and (jumps <= 1 + _JITTER).all()
-        if fits and not hides_gaps and uncertainty <= _KNOWN_RATE * step:
+        if fits and (_hides_gaps(step, coarsest) or uncertainty <= _KNOWN_RATE * step):
             return step, coarsest
     return None
+
+
+def _hides_gaps(step: float, digit: float) -> bool:
+    """Whether a lost sample looks like the rounding of a clock to its last digit."""
+    return _HALF * step < digit < _REPEATED * step
 
 
 def _line_through(time: Floats, weights: Floats) -> tuple[float, float, float]:
@@ -220,19 +228,22 @@ def evenly_sampled(columns: Columns, time: Floats) -> tuple[dict[str, Floats], f
     """The columns at even times, samples per unit of `time`, and what was done.
 
     A clock with jitter has its rate by regression, and the columns are interpolated by cubic splines. Of one that
-    misses samples the longest part without a gap is used. Raises ValueError where that is less than half, or where the
-    clock varies by more.
+    misses samples the longest part without a gap is used. Raises ValueError where that is less than half, where the
+    clock varies by more, or where its last digit is as coarse as a step, except where it has a part without a gap so
+    long that its rate is known all the same.
     """
-    ends = _gaps(time)
+    ends, rounded = _gaps(time), _rounded_clock(time)
+    too_coarse = rounded is not None and _hides_gaps(*rounded)
     if len(ends):
-        part, note = _longest_without(ends, time)
+        part, note = _longest_without(ends, time, too_coarse)
         whole, sampled, further = evenly_sampled({name: column[part] for name, column in columns.items()}, time[part])
         return whole, sampled, "; ".join(filter(None, (note, further)))
     rate = even_rate(time)
     if rate is not None:
-        rounded = _rounded_clock(time)
         coarse = rounded is not None and rounded[1] > _FINE * rounded[0]
         return dict(columns), rate, _COARSE.format(rounded[1] * rate) if rounded and coarse else ""
+    if too_coarse:
+        raise ValueError(_AS_COARSE_AS_A_STEP)
     start, step, _ = _line_through(time, np.ones(len(time)))
     with np.errstate(all="ignore"):
         off = time - (start + step * np.arange(len(time)))
@@ -260,14 +271,21 @@ def _gaps(time: Floats) -> Indices:
     return np.flatnonzero(steps > 2 - _HALF) if is_clock else np.zeros(0, dtype=np.intp)
 
 
-def _longest_without(ends: Indices, time: Floats) -> tuple[slice, str]:
-    """The longest part between the gaps after these samples, and a note; raises ValueError where that is too short."""
+def _longest_without(ends: Indices, time: Floats, too_coarse: bool) -> tuple[slice, str]:
+    """The longest part between the gaps after these samples, and a note; raises ValueError where that is too short.
+
+    What looks like lost samples of a clock that is `too_coarse` may be its rounding.
+    """
     usual = float(np.median(np.diff(time)))
     missing = int(np.rint(np.diff(time)[ends] / usual - 1).sum())
     starts, stops = np.append(0, ends + 1), np.append(ends + 1, len(time))
     longest = int(np.argmax(stops - starts))
     part = slice(int(starts[longest]), int(stops[longest]))
-    gaps = f"the clock misses {missing} samples, the first after {time[ends[0]]:.6g} s"
+    if too_coarse and part.stop - part.start < max(_HALF * len(time), 1 / _KNOWN_RATE):
+        raise ValueError(_AS_COARSE_AS_A_STEP)
+    gaps = (
+        f"the clock misses {missing} {'sample' if missing == 1 else 'samples'}, the first after {time[ends[0]]:.6g} s"
+    )
     whole = f"the longest part without a gap has {part.stop - part.start} of {len(time)}"
     if part.stop - part.start < _HALF * len(time):
         raise ValueError(f"{gaps}; {whole}, less than half: record again without losing samples")

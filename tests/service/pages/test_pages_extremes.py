@@ -13,7 +13,7 @@ from service.store import campaigns
 from tests.service.in_process import InProcess, in_process
 from tests.service.pages.forms import BROWSING
 from tests.support.store_server import campaign
-from underskin.recordings.campaign import Campaign, parse
+from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, parse
 
 FIRST, LAST = "0001-01-01T00:00:00Z", "9999-12-31T23:59:59.999999Z"
 BEYOND = (1e300, -1e300, 1e-300)
@@ -50,10 +50,9 @@ def mutated() -> list[dict[str, Any]]:
     for number in BEYOND:
         for field in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "d33_pc_per_n"):
             another(f"{field} {number}")["skin"][field] = number
-        fields = ("indenter_radius_mm", "preload_n", "dynamic_force_n", "dwell_s")
-        for entry, field in zip(another(f"one in each {number}")["recordings"], fields, strict=False):
-            entry[field] = number
-        another(f"all lines {number}")["recordings"][0]["frf_re_pc_per_n"] = [number] * 6
+        for field in ("indenter_radius_mm", "preload_n", "dynamic_force_n", "dwell_s", "frf_re_pc_per_n"):
+            entry = another(f"{field} {number}")["recordings"][0]
+            entry[field] = [number] * 6 if field == "frf_re_pc_per_n" else number
     for size, skin in ((1e6, 1e6), (1e-9, 1e-9), (1e6, 2.0), (1e-9, 2.0)):
         edge = another(f"at the bounds {size} {skin}")
         edge["skin"] |= {"thickness_mm": skin, "sensor_radius_mm": skin}
@@ -113,31 +112,24 @@ def kept_before() -> list[Campaign]:
     """Campaigns as an earlier underskin kept them."""
     good = parse(document())
     made: list[Campaign] = []
-    together: tuple[tuple[dict[str, Any], ...], ...] = (  # of each recording of a campaign, the last a curve
-        (
-            {"recorded_at": FIRST},
-            {"recorded_at": LAST},
-            {"recorded_at": "0001-01-01T00:00:00+14:00"},
-            {},
-            {"force_n": np.linspace(0, 1e300, 40)},
-        ),
-        (
-            {"frf_re_pc_per_n": np.full(6, 1e300)},
-            {},
-            {"indenter_radius_mm": 1e-300},
-            {"preload_n": 1e300},
-            {"displacement_mm": np.linspace(0, 1e300, 40)},
-        ),
-        (
-            {"frf_im_pc_per_n": np.full(6, -1e300)},
-            {"position_mm": (1e300, -1e300)},
-            {"dwell_s": 1e300, "conditions": {"temperature": -1e300}},
-            {},
-            {"force_n": np.linspace(0, 1e-300, 40)},
-        ),
+    changes: tuple[tuple[int, dict[str, Any]], ...] = (
+        (0, {"recorded_at": FIRST}),
+        (0, {"recorded_at": LAST}),
+        (0, {"recorded_at": "0001-01-01T00:00:00+14:00"}),
+        (0, {"frf_re_pc_per_n": np.full(6, 1e300)}),
+        (0, {"frf_im_pc_per_n": np.full(6, -1e300)}),
+        (0, {"indenter_radius_mm": 1e-300}),
+        (0, {"preload_n": 1e300}),
+        (0, {"position_mm": (1e300, -1e300)}),
+        (0, {"dwell_s": 1e300, "conditions": {"temperature": -1e300}}),
+        (-1, {"force_n": np.linspace(0, 1e300, 40)}),
+        (-1, {"displacement_mm": np.linspace(0, 1e300, 40)}),
+        (-1, {"force_n": np.linspace(0, 1e-300, 40)}),
     )
-    for changes in together:
-        entries: list[Any] = [replace(one, **change) for one, change in zip(good.recordings, changes, strict=True)]
+    for place, change in changes:
+        entries: list[Any] = list(good.recordings)
+        assert isinstance(entries[place], FrfRecording | IndentationRecording)
+        entries[place] = replace(entries[place], **change)
         made.append(replace(good, name=f"kept {len(made)}", recordings=tuple(entries)))
     for field in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm"):
         for size in (1e300, 1e-300):
@@ -153,7 +145,7 @@ def test_every_page_of_what_was_kept_is_answered(zone: str, tmp_path: Path, monk
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", zone)
     with in_process(tmp_path) as service:
         kept = []
-        for number, one in enumerate(kept_before()[: None if zone == ZONES[0] else 1]):
+        for number, one in enumerate(kept_before()[: None if zone == ZONES[0] else 3]):
             arrival = campaigns.NewCampaign(one, f"skin{number}")
             campaign_id, _ = service.store.write(campaigns.add, arrival)
             kept.append((campaign_id, f"skin{number}"))

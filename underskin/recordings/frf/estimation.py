@@ -17,6 +17,7 @@ not.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -334,7 +335,7 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         )
     ]  # between the steps a jump is the step itself
     bad = damaged(defects, len(force))
-    defects = [defect for defect in defects if not _is_switch(defect, steps, sample_rate)]
+    defects = _without_switches(defects, steps, sample_rate)
     lines: dict[float, list[tuple[Complexes, Complexes]]] = {}
     for step in steps:
         pair = step_amplitudes(force, charge, sample_rate, step, bad)
@@ -359,11 +360,15 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     return Frf(frequency, values, coherence, averages, tuple(defects))
 
 
-def _is_switch(defect: Defect, steps: Sequence[Step], sample_rate: float) -> bool:
-    """Whether a jump lies in the last cycle of a step: crossings tell the sample where tones change to a cycle."""
-    ends = (step.last - defect.first_sample for step in steps)
-    cycles = (sample_rate / step.frequency for step in steps)
-    return defect.kind == DefectKind.JUMP and any(0 < left <= cycle for left, cycle in zip(ends, cycles, strict=True))
+def _without_switches(defects: Sequence[Defect], steps: Sequence[Step], sample_rate: float) -> list[Defect]:
+    """The defects without the last jump of each channel in the last cycle of a step that another follows: crossings
+    tell the sample where tones change to a cycle."""
+    switches: dict[tuple[str, int], Defect] = {}
+    for number, step in enumerate(steps[:-1]):
+        for defect in sorted(defects, key=attrgetter("first_sample")):
+            if defect.kind == DefectKind.JUMP and 0 < step.last - defect.first_sample <= sample_rate / step.frequency:
+                switches[defect.channel, number] = defect
+    return [defect for defect in defects if defect not in switches.values()]
 
 
 def _samples(defect: Defect, channel: str) -> int:

@@ -653,14 +653,15 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
         for bin_index in np.unique(bins).tolist() if known.any() else ():
             inside = np.flatnonzero(bins == bin_index)
             choices, choice_of_row = np.unique(used[:, inside], axis=0, return_inverse=True)  # mostly all lines
+            choice_of_row = choice_of_row.reshape(-1)  # NumPy 2.0 returns (rows, 1)
             for number in np.flatnonzero(choices.any(axis=1)).tolist():
-                lines = inside[choices[number]]
-                chosen = size[np.ix_(choice_of_row == number, lines)]
+                of_choice = inside[choices[number]]
+                chosen = size[np.ix_(choice_of_row == number, of_choice)]
                 columns = (
-                    np.median(stack.frequency[lines]),
+                    np.median(stack.frequency[of_choice]),
                     np.median(chosen, axis=1),
                     np.std(chosen, axis=1),
-                    len(lines),
+                    len(of_choice),
                 )
                 cells[bin_index].append(np.stack(np.broadcast_arrays(*columns), axis=1).astype(np.float64))
     tables = [np.concatenate(of_bin).T for of_bin in cells if of_bin]

@@ -133,8 +133,8 @@ def ungrouped(cell: str) -> str:
 
 
 _THOUSANDS = {
-    ",": re.compile(rf"\s*[-+{MINUS}]?\d{{1,3}}(?:\.\d{{3}})+,\d+\s*"),
-    ".": re.compile(rf"\s*[-+{MINUS}]?\d{{1,3}}(?:,\d{{3}})+\.\d+\s*"),
+    ",": re.compile(rf"\s*[-+{MINUS}]?[1-9]\d{{0,2}}(?:\.\d{{3}})+,\d+\s*"),
+    ".": re.compile(rf"\s*[-+{MINUS}]?[1-9]\d{{0,2}}(?:,\d{{3}})+\.\d+\s*"),
 }
 
 
