@@ -109,9 +109,10 @@ def small_strain_modulus(recording: CompressionRecording) -> CompressionModulus:
 
     Rivlin's series, nominal stress = 2 (λ⁻² − λ) (C1 + C2/λ + C3 (I1 − 3) + C4 (I1 − 3)²), E = 6 (C1 + C2) (Rivlin &
     Saunders, Phil. Trans. R. Soc. A 243 (1951) 251), with a zero of the force and slack. It is used where it leaves
-    only noise, with a zero as of a cell, and tells E from 0. An uneven end bends the start of a curve as well: without
-    that part, the series must still explain the branch surely better than one modulus does, and give the same E. A
-    frame that gives changes the slope too: the uncertainty contains a uniform value between E so and by one modulus.
+    only noise, with a zero as of a cell, tells E from 0, and gives another E than one modulus does. An uneven end bends
+    the start of a curve as well: without that part, the series must still explain the branch surely better than one
+    modulus does, and give the same E. A frame that gives changes the slope too: the uncertainty contains a uniform
+    value between E so and by one modulus.
     """
     plain = of_compression(recording)
     height = float(to_si("sample_height_mm", recording.sample_height_mm))
@@ -128,7 +129,7 @@ def small_strain_modulus(recording: CompressionRecording) -> CompressionModulus:
     differ = abs(series.modulus - later.modulus) > _DIFFER * np.hypot(series.deviation, later.deviation)
     if series.rms > AS_NOISE * noise or abs(series.zero) > 1 or sure < SURE or differ:
         return plain
-    if series.modulus < _DIFFER * series.deviation:
+    if series.modulus < _DIFFER * series.deviation or abs(series.modulus - plain.modulus) < plain.uncertainty:
         return plain
     return replace(
         plain,
