@@ -36,7 +36,7 @@ Plain world named: {percent(share(plain))}. Confident statements that are wrong:
 {percent(share([stated["class"] == WRONG for stated in confident]))}. Where the effect shows, stated with confidence:
 {percent(share(visible))}.
 
-A diagnoser that owns the rig's worlds and noise can quote d33 in the plain world and where the effect shows. Of
+A diagnoser that knows the rig's worlds and noise can quote d33 in the plain world and where the effect shows. Of
 these are quoted here: {percent(share(ideal))}. Where an effect that does not show moves d33, the relative interval of a
 quoted one holds what the world without the effect makes of the recordings: {percent(share(moved))}.
 """
