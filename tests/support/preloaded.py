@@ -187,7 +187,7 @@ def _run(order: dict[str, Any], files: list[int]) -> None:
     for descriptor, file in enumerate(files[:-1]):
         os.dup2(file, descriptor)
     os.closerange(3, os.sysconf("SC_OPEN_MAX"))
-    sys.stdin = open(0, encoding=sys.stdout.encoding, closefd=False)  # noqa: SIM115  # open to its end
+    sys.stdin = os.fdopen(0, encoding=sys.stdout.encoding, closefd=False)
     os.environ.clear()
     os.environ.update(order["environment"])
     time.tzset()

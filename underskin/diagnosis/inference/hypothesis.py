@@ -161,7 +161,8 @@ class Tangent:
         """Information Jᵀ C⁻¹ J (points, P, P) on the parameters and gradient of the log likelihood (points, P).
 
         J = F ∂L u + a v. The gradient follows from those by L, Re u*u and Re u*y of each recording, and includes log|C|
-        and all columns of C that depend on the model.
+        and the columns of C that depend on the model: exact without positioning scatter and at sensor gains of 0, else
+        as `_gradients` says.
         """
         by_level, sums = self._products.level_slopes, self._slope_sums
         of_level, of_uv, of_vr = self._gradients
@@ -183,7 +184,8 @@ class Tangent:
         """Derivatives of the log likelihood (points, recordings, 1) by L, by Re u*v with Re v*r held, and by Re v*r, v
         being a change of u and r the residual.
 
-        The position slopes are taken to change as L does, or not at all where they dominate.
+        The position slopes are taken to change as L does, or not at all where they dominate, and the mean as if the
+        sensors' gains were 0.
         """
         a, uu, ur, variance, reduced = self._a, self._uu, self._ur, self._variance, self._reduced
         gain = self._sensor_gains @ self._sensors.T

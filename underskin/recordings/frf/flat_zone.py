@@ -657,12 +657,8 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
             for number in np.flatnonzero(choices.any(axis=1)).tolist():
                 of_choice = inside[choices[number]]
                 chosen = size[np.ix_(choice_of_row == number, of_choice)]
-                columns = (
-                    np.median(stack.frequency[of_choice]),
-                    np.median(chosen, axis=1),
-                    np.std(chosen, axis=1),
-                    len(of_choice),
-                )
+                middle_hz = np.median(stack.frequency[of_choice])
+                columns = middle_hz, np.median(chosen, axis=1), np.std(chosen, axis=1), len(of_choice)
                 cells[bin_index].append(np.stack(np.broadcast_arrays(*columns), axis=1).astype(np.float64))
     tables = [np.concatenate(of_bin).T for of_bin in cells if of_bin]
     several = np.concatenate([scatter[count >= _SEVERAL] for _, _, scatter, count in tables]) if tables else np.zeros(0)
