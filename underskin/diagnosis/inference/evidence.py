@@ -21,7 +21,15 @@ from scipy.special import log_ndtr
 
 from underskin.diagnosis.inference.fit import Fitter, Scatter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Points, Tangent, cell_response
+from underskin.diagnosis.inference.hypothesis import (
+    FLAT,
+    Evaluated,
+    FitPoint,
+    Hypothesis,
+    Points,
+    Tangent,
+    cell_response,
+)
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
 from underskin.mechanisms.models.frf import FrfModel
@@ -35,7 +43,6 @@ _REMAINING_GAIN = 1.0  # gain in log posterior that polishing may leave
 _LEAST_BOUNDS_TERM = -50.0  # nats: bounds around the point reduce an integral by less, and never raise it
 NEGLIGIBLE_NATS = 12.0  # of log evidence behind the best: odds of 1 to 160,000, which no other set makes up for
 _LEAST_EIGENVALUE = 1e-11  # of correlations or their information: less is rounding
-FLAT = 1e-3  # standard deviations of a quadratic, at least, within a parameter's bounds: keeps H invertible
 
 
 @dataclass(frozen=True)
@@ -99,6 +106,11 @@ class Evidence:
         if isinstance(model, FrfModel):
             return model.relative_place_slopes(self.point.fit)
         return np.zeros((2, self.hypothesis.lines.recordings))
+
+    def position_variance(self, position: float) -> Floats:
+        """The variance of each recording's relative level by this positioning scatter [m] (recordings,)."""
+        first_order = position**2 * (self.relative_place_slopes**2).sum(axis=0)
+        return np.asarray(first_order + 0.5 * position**4 * self.hypothesis.curvature.square)
 
     @cached_property
     def levels(self) -> NoiseLevels:

@@ -302,6 +302,7 @@ class Evaluated(AtPoints):
         return self[np.array([np.argmin(self.cost)])]
 
 
+FLAT = 1e-3  # standard deviations of a quadratic, at least, within a parameter's bounds: keeps information invertible
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
 _CURVE_LEVELS = (0.3, 5.0)  # least accuracy of a cell; larger noise would exceed the differences of neighbours
 
@@ -369,6 +370,11 @@ class Hypothesis:
             freedom = parameter.prior.freedom if isinstance(parameter.prior, Normal) else np.inf
             rows.append((*curvature_of_prior(parameter), parameter.log_height, freedom))
         return np.array(rows).T
+
+    @cached_property
+    def prior_precision(self) -> Floats:
+        """Of the parameters' priors (parameters,), at least `FLAT` standard deviations within the bounds."""
+        return np.asarray(self.priors[0] + (FLAT / np.maximum(np.ptp(self.bounds, axis=0), 1e-300)) ** 2)
 
     @cached_property
     def spans(self) -> dict[str, slice]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import (
-    FLAT,
+    Evidence,
     level_integrals,
     marginalise_sensor_spread,
     mean_integrals,
@@ -29,8 +29,10 @@ from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, Points
 from underskin.errors import InvalidInput
 from underskin.halton import halton
+from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.curves import CurveModel
+from underskin.mechanisms.models.frf import FAINT
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter
 from underskin.prediction.pressed_skin import declared_skin, log_slopes
 from underskin.recordings.campaign import Tolerances, frf_of
@@ -80,10 +82,61 @@ def residuals(problem: FittingProblem, explanation: Explanation, gain: float, po
     precision = lines.deviation**-2
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
-    relative = explanation.best.relative_place_slopes
-    position_variance = position**2 * (relative**2).sum(axis=0) + 0.5 * position**4 * problem.curvature.square
-    line, weight = line_residuals(problem, explanation)
-    return Residuals(along / size - 1, np.sqrt(gain**2 + position_variance + 1 / size), line, weight)
+    variance = gain**2 + explanation.best.position_variance(position) + 1 / size
+    return Residuals(along / size - 1, np.sqrt(variance), *line_residuals(problem, explanation))
+
+
+@dataclass(frozen=True, eq=False)
+class LevelResiduals:
+    """The relative residual r of each recording's level, its prior of the parameters and of the sensors' gains
+    marginalised: C = V + F Fᵀ, V the `variance` by the fit's noise, F the change by one prior deviation of each.
+
+    Attributes: C⁻¹ = V⁻¹ − Tᵀ T with the `projector` T (columns, recordings), `weighted` C⁻¹ r (recordings,), and the
+    `least` V of a careful rig over that of the fit.
+    """
+
+    residual: Floats
+    variance: Floats
+    projector: Floats
+    weighted: Floats
+    least: float
+
+    @classmethod
+    def of(cls, best: Evidence) -> Self:
+        """Of a fit to FRFs."""
+        size, along, square = best.tangent.projections(best.levels.position)
+        least = FAINT * np.abs(size).max()
+        size = np.where(np.abs(size) > least, size, least)
+        slopes = best.tangent.slope_projections[0].T / size[:, None]
+        centre = np.array([parameter.start for parameter in best.hypothesis.model.parameters]) - best.point.fit
+        residual = along / size - slopes @ centre
+        scatter = best.position_variance(best.levels.position) + square * (best.levels.level / size) ** 2
+        variance = best.levels.gain**2 + scatter
+        least = min(float(np.median((GAIN_RANGE[0] ** 2 + scatter) / variance)), 1.0)
+        deviations = best.hypothesis.prior_precision**-0.5
+        columns = np.hstack([slopes * deviations, best.levels.spread * best.hypothesis.lines.sensors])
+        weighed = columns.T / variance
+        lower = np.linalg.cholesky(weighed @ columns + np.eye(columns.shape[1]))
+        projector = np.linalg.solve(lower, weighed)
+        weighted = residual / variance - (projector @ residual) @ projector
+        return cls(residual, variance, projector, weighted, least)
+
+    @property
+    def chi2(self) -> float:
+        """rᵀ C⁻¹ r."""
+        return float(self.residual @ self.weighted)
+
+    @property
+    def freedom(self) -> float:
+        """The number of recordings, less what parameters and sensors' gains take up of it."""
+        return float(len(self.residual) - (self.variance * (self.projector**2).sum(axis=0)).sum())
+
+    def products(self, changes: Floats) -> tuple[Floats, Floats]:
+        """XᵀC⁻¹X (sets, features, features) and XᵀC⁻¹r (sets, features) of sets of relative changes X of the levels
+        (sets, recordings, features)."""
+        rows = changes.swapaxes(1, 2)
+        taken_up = self.projector @ changes
+        return (rows / self.variance) @ changes - taken_up.swapaxes(1, 2) @ taken_up, rows @ self.weighted
 
 
 def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
@@ -112,7 +165,7 @@ class Linearised:
         fitter, covariance = Fitter(hypothesis), (noise or explanation).point.covariance
         at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)), slopes=False)
         information = fitter.tangent(at.points, at.products).information_on_forces(np.concatenate([slopes, changes]))
-        return cls(information, hypothesis.priors[0] + (FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
+        return cls(information, hypothesis.prior_precision)
 
     @property
     def of_changes(self) -> Floats:
