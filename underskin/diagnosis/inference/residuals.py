@@ -104,20 +104,19 @@ class LevelResiduals:
     @classmethod
     def of(cls, best: Evidence) -> Self:
         """Of a fit to FRFs."""
-        size, along, square = best.tangent.projections(best.levels.position)
-        least = FAINT * np.abs(size).max()
-        size = np.where(np.abs(size) > least, size, least)
-        slopes = best.tangent.slope_projections[0].T / size[:, None]
+        square, size, along, by_parameters = best.tangent.projections
+        size = np.where(np.abs(size) > FAINT * np.abs(size).max(), size, FAINT * np.abs(size).max())
+        slopes = (by_parameters / size).T
         centre = np.array([parameter.start for parameter in best.hypothesis.model.parameters]) - best.point.fit
         residual = along / size - slopes @ centre
-        scatter = best.position_variance(best.levels.position) + square * (best.levels.level / size) ** 2
+        scatter = best.position_variance(best.levels.position) + square / size**2
         variance = best.levels.gain**2 + scatter
         least = min(float(np.median((GAIN_RANGE[0] ** 2 + scatter) / variance)), 1.0)
         deviations = best.hypothesis.prior_precision**-0.5
         columns = np.hstack([slopes * deviations, best.levels.spread * best.hypothesis.lines.sensors])
         weighed = columns.T / variance
         lower = np.linalg.cholesky(weighed @ columns + np.eye(columns.shape[1]))
-        projector = np.linalg.solve(lower, weighed)
+        projector = np.asarray(np.linalg.solve(lower, weighed), dtype=float)
         weighted = residual / variance - (projector @ residual) @ projector
         return cls(residual, variance, projector, weighted, least)
 
