@@ -15,6 +15,7 @@ the profile of the posterior, which need not be Gaussian, ends it (`profile_end`
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -316,13 +317,10 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list
     covariance = grid.points.covariance.copy()
     covariance[:, column] = np.tile(low + (high - low) * (np.arange(_SPREAD_VALUES) + 0.5) / _SPREAD_VALUES, len(at))
     shifted = _with_levels(fitter, grid, covariance)
-    values, covariances = mean_integrals(fitter, shifted)
-    free = np.flatnonzero(fitter.free)
-    mean_index = int(np.searchsorted(free, index))
-    information, gradient = fitter.posterior_equations(shifted)
-    step = np.linalg.solve(information[:, free[:, None], free], gradient[:, free, None])[:, mean_index, 0]
-    mean = shifted.points.fit[:, index] + step
-    deviation = np.sqrt([covariance[mean_index, mean_index] for covariance in covariances])
+    values, means, covariances = _quadratics(fitter, shifted)
+    row = int(np.searchsorted(np.flatnonzero(fitter.free), index))
+    mean = np.array([mean[row] for mean in means])
+    deviation = np.sqrt([covariance[row, row] for covariance in covariances])
     return [
         NormalMixture(_shares(values[rows]), mean[rows], deviation[rows])
         for rows in (slice(first, first + _SPREAD_VALUES) for first in range(0, len(values), _SPREAD_VALUES))
@@ -358,10 +356,7 @@ def marginalise_curve_noise(evidence: Evidence, indices: Sequence[int]) -> Norma
     smooth = at.points.covariance[0, Scatter.SMOOTH] + smooth_sd * _SMOOTH_STEPS
     smooth = smooth[(smooth >= sizes.low) & (smooth <= sizes.high)]
     covariance = np.tile(at.points.covariance, (len(gain) * len(smooth), 1))
-    covariance[:, Scatter.GAIN], covariance[:, Scatter.SMOOTH] = (
-        np.repeat(gain, len(smooth)),
-        np.tile(smooth, len(gain)),
-    )
+    covariance[:, [Scatter.GAIN, Scatter.SMOOTH]] = [*product(gain, smooth)]
     shifted = _with_levels(fitter, at[np.zeros(len(covariance), dtype=np.intp)], covariance)
     shifted = shifted[np.flatnonzero(shifted.cost < shifted.cost.min() + NEGLIGIBLE_NATS)]
     values, means, covariances = _quadratics(fitter, shifted)

@@ -229,8 +229,7 @@ def _frf_deviation(problem: FittingProblem, explanation: Explanation, predicted:
     lines, best = problem.lines, explanation.best
     levels = best.levels
     of_line = (levels.level * lines.deviation) ** 2 + on_rows(lines, best.pickup_variance)
-    position_variance = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
-    relative = levels.gain**2 + position_variance + 0.5 * levels.position**4 * problem.curvature.square
+    relative = levels.gain**2 + best.position_variance(levels.position)
     return np.sqrt(of_line + relative[lines.recording] * np.array([predicted.real, predicted.imag]) ** 2)
 
 
@@ -392,10 +391,8 @@ class Thinned:
         variance = np.zeros(len(prediction.value))
         if self.lines.smooth is not None:
             variance += (levels.smooth * self.lines.smooth.scale) ** 2
-        squared_slopes = (explanation.best.relative_place_slopes**2).sum(axis=0)[
-            explanation.best.hypothesis.lines.recording
-        ]
-        variance += levels.position**2 * squared_slopes * np.abs(prediction.value) ** 2
+        of_recordings = explanation.best.position_variance(levels.position)
+        variance += of_recordings[explanation.best.hypothesis.lines.recording] * np.abs(prediction.value) ** 2
         return on_rows(self.lines, variance + explanation.best.pickup_variance)
 
     def _mean(self, column: Floats) -> Floats:
