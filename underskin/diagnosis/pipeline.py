@@ -11,7 +11,7 @@ import scipy
 from underskin.diagnosis.data.dataset import curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import residuals, row_prediction
-from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, describe, effect, in_region, locate, region
+from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, effect, in_region, locate, region
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
@@ -221,7 +221,6 @@ def _complete(
         return replace(partial, lacking=Lacking(Lack.FEW_TO_AGREE, few), few=result, problem=problem)
     undescribed = leader.explanation is None and result.law is None
     partial = partial.with_findings(*_scatter_findings(problem, stated))
-    shape = describe(problem, stated) if undescribed else None
     partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
     determining = frozenset() if partial.joined is None else partial.joined.determining_modulus(stated.names)
     if leader.explanation is not None:
@@ -237,7 +236,6 @@ def _complete(
         confounded=remaining_confounding(confounded, result.answers),
         power=power(signatures, stated, result.supported),
         shifts=hidden_shifts(problem, signatures, stated, result.supported, determining),
-        shape=shape,
         plan=plan(problem, result, limits),
     )
 

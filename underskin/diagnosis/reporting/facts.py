@@ -13,7 +13,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.localisation import AxisResult, EffectSize, Shape
+from underskin.diagnosis.localisation import AxisResult, EffectSize
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.d33 import BY_NUISANCES, SEVERAL_ANSWERS, StatedD33, d33_over_answers
@@ -60,7 +60,6 @@ class DiagnosisResult:
     confounded: Sequence[Confounding] = ()
     power: Sequence[Power] = ()
     shifts: Sequence[HiddenShift] = ()
-    shape: Shape | None = None  # of the residual, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
     joined: KindsTogether | None = None  # with recordings of other kinds; not None where there is a search

@@ -22,7 +22,7 @@ from underskin.diagnosis.data.names import (
     quantity_in_words,
 )
 from underskin.diagnosis.reporting import kinds, numbers
-from underskin.diagnosis.reporting.entries import shape_clause, stage_clause
+from underskin.diagnosis.reporting.entries import stage_clause
 from underskin.diagnosis.reporting.facts import Facts
 from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
@@ -98,8 +98,6 @@ def statement(facts: Facts) -> str:
         if verdict in ("explained", "no_mismatch"):
             open_questions.insert(0, _reserve(fit))
         if verdict == "unexplained":
-            # The shape of the residual is not stated where a mechanism that may explain it was not tried
-            second += ["" if facts.untried else shape_clause(facts.diagnosis.shape)]
             second += [_misfit_clause(fit, model)] if of_curves else []
         elif of_curves:
             settled = verdict != "ambiguous"
