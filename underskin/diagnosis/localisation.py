@@ -28,15 +28,14 @@ MOST_LINES = 160  # distinct frequencies, beyond which they are binned
 _DRAWS, _SEED = 1000, 20180207
 
 
-def frequency_bins(frequency: Floats) -> tuple[Indices, Floats]:
-    """Of each row its distinct frequency, or its bin where there are too many, and the frequencies."""
+def _bins(frequency: Floats) -> Indices:
+    """Of each row the number of its distinct frequency, or of its bin where there are too many (rows,)."""
     distinct, line = np.unique(np.round(frequency, 6), return_inverse=True)
     if len(distinct) <= MOST_LINES:
-        return line, distinct
+        return line
     edges = np.geomspace(distinct[0], distinct[-1] * (1 + 1e-9), MOST_LINES + 1)
     line = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, MOST_LINES - 1)
-    used, line = np.unique(line, return_inverse=True)
-    return line, np.sqrt(edges[used] * edges[used + 1])
+    return np.unique(line, return_inverse=True)[1]
 
 
 @dataclass(frozen=True)
@@ -239,10 +238,11 @@ def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator)
     observed, then under each change of signs."""
     if lines.recordings < 6 or len(lines.value) < 2 * lines.recordings:
         return {}
-    line, centres = frequency_bins(lines.frequency)
-    if len(centres) < 2:
+    line = _bins(lines.frequency)
+    count = int(line.max()) + 1
+    if count < 2:
         return {}
-    total = np.bincount(line, residuals.line_weight, len(centres))
+    total = np.bincount(line, residuals.line_weight)
     signs = np.concatenate(
         [np.ones((1, lines.recordings)), random.choice([-1.0, 1.0], (PERMUTATIONS, lines.recordings))]
     )
@@ -251,7 +251,7 @@ def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator)
     if lines.curves:
         parts = {"displacement_mm": residuals.line.real}
     for name, part in parts.items():
-        sums = np.zeros((lines.recordings, len(centres)))
+        sums = np.zeros((lines.recordings, count))
         np.add.at(sums, (lines.recording, line), residuals.line_weight * part)
         statistics[name] = ((signs @ sums) ** 2 / total).sum(axis=1)
     return statistics

@@ -10,7 +10,7 @@ import scipy
 
 from underskin.diagnosis.data.dataset import curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.residuals import residuals, row_prediction
+from underskin.diagnosis.inference.residuals import Residuals, row_prediction
 from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, effect, in_region, locate, region
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
@@ -245,7 +245,7 @@ def _locate(
 ) -> tuple[list[AxisResult], dict[str, list[float | str]], EffectSize]:
     """Where the recordings deviate from the base model, and by how much there; `levels` are those of the answer."""
     gain = float(np.clip(levels.gain, 0.005, 0.05))
-    against_base = residuals(problem, null, gain, levels.position)
+    against_base = Residuals.of(problem, null, gain, levels.position)
     axes = locate(problem.lines, against_base)
     ranges = region(problem.lines, against_base, axes)
     prediction = row_prediction(problem, null)

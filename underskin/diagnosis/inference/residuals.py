@@ -39,16 +39,6 @@ from underskin.recordings.campaign import Tolerances, frf_of
 from underskin.units import Array, Floats, Indices, to_si
 
 
-@dataclass(frozen=True)
-class Residuals:
-    """Residuals at an explanation's most probable parameters."""
-
-    gain: Floats  # (recordings,) relative
-    gain_deviation: Floats  # (recordings,) expected sd: gain scatter, positioning and lines
-    line: Array  # (rows,) complex, relative
-    line_weight: Floats  # (rows,) 1/variance of real and of imaginary part
-
-
 def row_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
     """The explanation's prediction on all rows."""
     return on_rows(problem.lines, explanation.best.prediction.value)
@@ -59,31 +49,28 @@ def on_rows(lines: Lines, column: Array) -> Array:
     return column if len(column) == len(lines.value) else column[lines.recording]
 
 
-def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[Array, Floats]:
-    """Each line divided by its recording's best real multiple of the model, minus 1, and its weight 1/variance.
+@dataclass(frozen=True)
+class Residuals:
+    """Residuals at an explanation's most probable parameters: of recordings over the model, and of lines over their
+    recording's best real multiple of it."""
 
-    The variance excludes the noise's level; mains pick-up adds to it.
-    """
-    lines, prediction, best = problem.lines, row_prediction(problem, explanation), explanation.best
-    first = lines.first
-    further = 0.0 if best.prediction.pickup_rows is None else best.pickup_variance / best.levels.level**2
-    precision = 1 / (lines.deviation**2 + further)
-    along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, first)
-    size = np.add.reduceat(precision * np.abs(prediction) ** 2, first)
-    fitted = prediction * (along / size)[lines.recording]
-    safe = np.where(np.abs(fitted) > 0, fitted, 1.0)
-    return (lines.value - fitted) / safe, precision * np.abs(fitted) ** 2
+    gain: Floats  # (recordings,) relative
+    gain_deviation: Floats  # (recordings,) expected sd: gain scatter, positioning and lines
+    line: Array  # (rows,) complex, relative
+    line_weight: Floats  # (rows,) 1/variance of real and of imaginary part, without the noise's level
 
-
-def residuals(problem: FittingProblem, explanation: Explanation, gain: float, position: float) -> Residuals:
-    """The residuals, with their expected scatters: `gain` (relative) and `position` [m]."""
-    lines = problem.lines
-    prediction = row_prediction(problem, explanation)
-    precision = lines.deviation**-2
-    size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
-    along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
-    variance = gain**2 + explanation.best.position_variance(position) + 1 / size
-    return Residuals(along / size - 1, np.sqrt(variance), *line_residuals(problem, explanation))
+    @classmethod
+    def of(cls, problem: FittingProblem, explanation: Explanation, gain: float = 0.0, position: float = 0.0) -> Self:
+        """With these scatters of gain (relative) and of position [m]; mains pick-up adds to the variance of lines."""
+        lines, prediction, best = problem.lines, row_prediction(problem, explanation), explanation.best
+        further = 0.0 if best.prediction.pickup_rows is None else best.pickup_variance / best.levels.level**2
+        precision = 1 / (lines.deviation**2 + further)
+        along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
+        size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
+        fitted = prediction * (along / size)[lines.recording]
+        line = (lines.value - fitted) / np.where(np.abs(fitted) > 0, fitted, 1.0)
+        deviation = np.sqrt(gain**2 + best.position_variance(position) + 1 / size)
+        return cls(along / size - 1, deviation, line, precision * np.abs(fitted) ** 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 A score test estimates what each of several hundred laws would gain in evidence on top of an explanation. The residual
 of the explanation is projected onto the change that a law would make, on a small grid of its shape parameters: linear
 algebra under the noise, no fit. Laws over whole recordings are tested on their levels (`LevelResiduals`), laws along
-frequency on the deviations of lines from their recording's best real multiple (`line_residuals`), laws of indentation
+frequency on the deviations of lines from their recording's best real multiple (`Residuals`), laws of indentation
 curves on samples, together with the explanation's parameters.
 
 The test is made on top of the null hypothesis, of the best sets of mechanisms, and of the best set without one of its
@@ -25,8 +25,8 @@ from underskin.diagnosis.inference.residuals import (
     MAY_MATTER_NATS,
     LevelResiduals,
     Linearised,
+    Residuals,
     force_and_slopes,
-    line_residuals,
 )
 from underskin.diagnosis.selection.answers import Search
 from underskin.mechanisms.base import Normal, Parameter
@@ -193,7 +193,8 @@ class Screening:
     def _moments(self, explanation: Explanation) -> tuple[Floats, Array, "_Noise"]:
         """Weights and weighted residuals of lines (recordings, distinct frequencies), and their χ²."""
         lines = self._problem.lines
-        relative, weight = line_residuals(self._problem, explanation)
+        residuals = Residuals.of(self._problem, explanation)
+        relative, weight = residuals.line, residuals.line_weight
         size = lines.recordings, len(self._frequency)
         index = lines.recording * size[1] + self._line
         weights, real, imag = (
