@@ -124,7 +124,7 @@ def _diagnose_frf(
     progress: Progress,
     limits: RigLimits,
 ) -> DiagnosisResult:
-    frf = tuple(recording for recording in campaign.recordings if isinstance(recording, FrfRecording))
+    frf = tuple(campaign.of(FrfRecording))
     inspection = inspect(replace(campaign, recordings=frf), table)
     joined: KindsTogether | None = None
     while not inspection.lacking:

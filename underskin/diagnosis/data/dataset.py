@@ -89,8 +89,7 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
             continue
         if not agree(name, values):
             columns_by_axis[name] = _scaled(name, values)[:, None]
-    frf = [recording for recording in recordings if isinstance(recording, FrfRecording)]
-    if frf:
+    if frf := campaign.of(FrfRecording):
         columns_by_axis["position_mm"] = 1e3 * offsets(campaign)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
         columns_by_axis["sensor"] = np.array([centres[recording.sensor] for recording in frf])
@@ -466,71 +465,37 @@ def lines(
     `predicted`: the same lines and a prediction of the rows (rows,), whose change with frequency is no noise. The
     `campaign` of the result holds only the FRF recordings with finite lines.
     """
-    measured = _measured(campaign, uneven or {})
-    recording_index = np.repeat(np.arange(len(measured.recordings)), measured.counts).astype(np.intp)
-    noise = line_noise(
-        measured.value,
-        measured.frequency,
-        recording_index,
-        measured.coherence,
-        measured.unevenness,
-        None if predicted is None else predicted[1],
-    )
+    measured = []
+    for recording in campaign.of(FrfRecording):
+        of_recording = lines_of(recording)
+        order = np.argsort(of_recording.frequency, kind="stable")
+        order = order[np.isfinite(of_recording.values[order]) & np.isfinite(of_recording.frequency[order])]
+        if len(order):
+            measured.append((recording, of_recording, order))
+    value = np.concatenate([*(found.values[order] for _, found, order in measured), np.zeros(0)]).astype(complex)
+    frequency = _joined([found.frequency[order] for _, found, order in measured])
+    coherence = _joined([found.coherence_or_nan[order] for _, found, order in measured])
+    even = [(uneven or {}).get(recording.id, np.ones(len(found.values))) for recording, found, _ in measured]
+    unevenness = _joined([column[order] for column, (_, _, order) in zip(even, measured, strict=True)])
+    recording_index = np.repeat(np.arange(len(measured)), [len(order) for _, _, order in measured]).astype(np.intp)
+    change = None if predicted is None else predicted[1]
+    noise = line_noise(value, frequency, recording_index, coherence, unevenness, change)
     if predicted is not None:
         return replace(predicted[0], deviation=noise.deviation, noise=noise)
-    segments = zip(measured.recordings, np.cumsum(measured.counts).tolist(), measured.counts, strict=True)
+    numbers = {sensor.id: index for index, sensor in enumerate(campaign.skin.sensors)}
     recordings = tuple(
-        FrfRecording.of_lines(recording, measured.frequency[end - count : end], measured.value[end - count : end])
-        for recording, end, count in segments
+        FrfRecording.of_lines(recording, found.frequency[order], found.values[order])
+        for recording, found, order in measured
     )
     return Lines(
         campaign=replace(campaign, recordings=recordings),
-        value=measured.value,
+        value=value,
         deviation=noise.deviation,
-        frequency=measured.frequency,
+        frequency=frequency,
         recording=recording_index,
-        sensor=measured.sensor,
+        sensor=np.array([numbers[recording.sensor] for recording in recordings], dtype=np.intp),
         noise=noise,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Measured:
-    """The recordings with finite lines, their sensors and numbers of lines, and columns over all these lines (rows,);
-    `coherence` is NaN where not given.
-    """
-
-    recordings: list[FrfRecording]
-    sensor: Indices
-    counts: list[int]
-    value: Complexes
-    frequency: Floats
-    coherence: Floats
-    unevenness: Floats
-
-
-def _measured(campaign: Campaign, uneven: Mapping[str, Floats]) -> _Measured:
-    numbers = {sensor.id: index for index, sensor in enumerate(campaign.skin.sensors)}
-    recordings: list[FrfRecording] = []
-    values, frequencies, coherences, unevens = [], [], [], []
-    for recording in campaign.recordings:
-        if not isinstance(recording, FrfRecording):
-            continue
-        measured = lines_of(recording)
-        order = np.argsort(measured.frequency, kind="stable")
-        order = order[np.isfinite(measured.values[order]) & np.isfinite(measured.frequency[order])]
-        if len(order) == 0:
-            continue
-        recordings.append(recording)
-        values.append(measured.values[order])
-        frequencies.append(measured.frequency[order])
-        coherences.append(measured.coherence_or_nan[order])
-        unevens.append(uneven.get(recording.id, np.ones(len(measured.values)))[order])
-    sensor = np.array([numbers[recording.sensor] for recording in recordings], dtype=np.intp)
-    counts = [len(value) for value in values]
-    value = np.concatenate([*values, np.zeros(0, dtype=complex)])
-    columns = (np.concatenate([*column, np.zeros(0)]) for column in (frequencies, coherences, unevens))
-    return _Measured(recordings, sensor, counts, value, *columns)
 
 
 _READING, _FULL_SCALE = 2e-3, 1e-3  # of a testing machine, without samples in the air
@@ -549,11 +514,9 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
     """The thinned curves of one kind; curves with fewer than five finite samples are left out."""
     curves: list[CurveRecording] = []
     forces, deviations, abscissae, errors = [], [], [], []
-    for curve in campaign.recordings:
-        if not isinstance(curve, CurveRecording) or curve.kind != kind:
-            continue
+    for curve in campaign.curves:
         columns = finite_samples(curve)
-        if len(columns[0]) < _LEAST_SAMPLES:
+        if curve.kind != kind or len(columns[0]) < _LEAST_SAMPLES:
             continue
         seen = curve_landmarks(*columns)
         force_zero = seen.zero if kind == "indentation" else 0.0

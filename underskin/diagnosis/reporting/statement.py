@@ -249,7 +249,7 @@ def _reserve(fit: Mapping[str, Any]) -> str:
 def _depths_clause(facts: Facts) -> str:
     """A clause on the depth of indentation over radius and declared thickness; empty for other recordings."""
     model, campaign = facts.shown.model, facts.problem.lines.campaign
-    curves = [recording for recording in campaign.recordings if isinstance(recording, IndentationRecording)]
+    curves = campaign.of(IndentationRecording)
     if not curves or not isinstance(model, CurveModel):
         return ""
     contacts = facts.shown.point.fit[model.contact_points].tolist()
