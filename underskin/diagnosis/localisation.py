@@ -58,9 +58,8 @@ def effect(lines: Lines, predicted: Array, rows: Mask, gain: float, level: float
     def summed(column: Floats) -> Floats:
         return np.bincount(recording, column).astype(float)
 
-    parts = 1 if lines.curves else 2
     size = summed(weight * np.abs(model) ** 2)
-    noise = parts * level**2 * np.bincount(recording) + gain**2 * size
+    noise = lines.parts * level**2 * np.bincount(recording) + gain**2 * size
     square = summed(weight * np.abs(off) ** 2) - noise
     along = summed(weight * (model.conj() * off).real)
     drawn = np.random.default_rng(_SEED).integers(len(size), size=(_DRAWS, len(size)))

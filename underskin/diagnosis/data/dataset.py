@@ -374,6 +374,11 @@ class Lines:
         return self.kind != "frf"
 
     @property
+    def parts(self) -> int:
+        """The number of parts of a row: real and imaginary, or one."""
+        return 1 if self.curves else 2
+
+    @property
     def row_axes(self) -> tuple[str, ...]:
         """The axes along which the rows of a recording run."""
         return ("displacement_mm",) if self.curves else ("frequency_hz", "phase")

@@ -16,7 +16,6 @@ from typing import Self
 
 import numpy as np
 
-from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import (
     Evidence,
     level_integrals,
@@ -26,27 +25,23 @@ from underskin.diagnosis.inference.evidence import (
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, Points
+from underskin.diagnosis.inference.hypothesis import Evaluated, Points, cell_response
 from underskin.errors import InvalidInput
 from underskin.halton import halton
 from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.mechanisms.models.frf import FAINT
+from underskin.mechanisms.models.frf import FAINT, FrfModel
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter
 from underskin.prediction.pressed_skin import declared_skin, log_slopes
 from underskin.recordings.campaign import Tolerances, frf_of
-from underskin.units import Array, Floats, Indices, to_si
+from underskin.units import Array, Floats, Indices, Mask, to_si
 
 
 def row_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
     """The explanation's prediction on all rows."""
-    return on_rows(problem.lines, explanation.best.prediction.value)
-
-
-def on_rows(lines: Lines, column: Array) -> Array:
-    """A column of all rows, or of the recordings (recordings,), as one of the rows (rows,)."""
-    return column if len(column) == len(lines.value) else column[lines.recording]
+    predicted, lines = explanation.best.prediction.value, problem.lines
+    return predicted if len(predicted) == len(lines.value) else predicted[lines.recording]
 
 
 @dataclass(frozen=True)
@@ -71,6 +66,44 @@ class Residuals:
         line = (lines.value - fitted) / np.where(np.abs(fitted) > 0, fitted, 1.0)
         deviation = np.sqrt(gain**2 + best.position_variance(position) + 1 / size)
         return cls(along / size - 1, deviation, line, precision * np.abs(fitted) ** 2)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What instruments are expected to read with their most probable gains: the `value` of each row, the `variance` of
+    its real and of its imaginary part, and that of a `relative` factor on it (rows,)."""
+
+    value: Array
+    variance: Floats
+    relative: Floats
+
+    @classmethod
+    def of(cls, problem: FittingProblem, explanation: Explanation, fitted: Mask | None = None) -> Self:
+        """Of all rows of a problem by an explanation of those that are `fitted`, by default all of them."""
+        lines, levels, fit = problem.lines, explanation.best.levels, explanation.point.fit
+        model = problem.hypothesis(explanation.names, has_position_scatter=False, all_lines=True).model
+        noise = (levels.level * lines.deviation) ** 2
+        if not isinstance(model, FrfModel):
+            assert lines.smooth is not None
+            force = model.predict(fit).value.real
+            cell = cell_response(lines, levels, force, fitted)
+            noise = noise + cell.variance + (levels.smooth * lines.smooth.scale) ** 2
+            return cls(cell.reading(lines, force), noise, np.zeros(len(force)))
+        prediction = model.predict(fit, slopes=False, place=False)
+        known = np.unique(lines.sensor[lines.recording if fitted is None else lines.recording[fitted]])
+        gains, spread = np.zeros(lines.sensors.shape[1]), np.full(lines.sensors.shape[1], levels.spread)
+        gains[known], spread[known] = explanation.best.sensor_gains[known], 0.0
+        p2, curvature = levels.position**2, problem.curvature  # a contact on an extremum of σ feels it in second order
+        factor = np.exp(gains[lines.sensor] + 0.5 * p2 * curvature.laplacian)
+        moved = p2 * (model.relative_place_slopes(fit) ** 2).sum(axis=0) + 0.5 * p2**2 * curvature.square
+        relative = levels.gain**2 + spread[lines.sensor] ** 2 + moved
+        value = prediction.value * factor[lines.recording]
+        return cls(value, noise + prediction.pickup_variance, relative[lines.recording])
+
+    @property
+    def of_parts(self) -> Floats:
+        """The variance of real and of imaginary part (2, rows)."""
+        return np.asarray(self.variance + self.relative * np.array([self.value.real, self.value.imag]) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
