@@ -16,7 +16,7 @@ from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.facts import DiagnosisResult
-from underskin.diagnosis.reporting.modulus import modulus_over_answers
+from underskin.diagnosis.reporting.quantities import modulus_over_answers
 from underskin.diagnosis.selection.answers import Search, inside_tables_under_posterior
 from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem
@@ -31,9 +31,7 @@ from underskin.diagnosis.validation.cross_validation import (
     largest_floor_percent,
     nearest_law_findings,
 )
-from underskin.diagnosis.validation.curve_spread import curve_spread_findings
-from underskin.diagnosis.validation.declared_thickness import thickness_findings
-from underskin.diagnosis.validation.imitation import odds_of_imitated_laws
+from underskin.diagnosis.validation.curve_checks import curve_spread_findings, odds_of_imitated_laws, thickness_findings
 from underskin.diagnosis.validation.signatures import (
     Signatures,
     confounding,

@@ -169,7 +169,7 @@ class Fitter:
 
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
         """The costs (points, sets) with covariance parameters (points, sets, parameters), at fixed predictions."""
-        from underskin.diagnosis.inference.kernels import log_priors
+        from underskin.diagnosis.kernels import log_priors
 
         pickup = self.model.pickup
         if pickup is not None or self.lines.curves:

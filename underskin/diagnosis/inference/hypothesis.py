@@ -68,7 +68,7 @@ def log_likelihoods(
 
     `sensor_log_gain` is (points, sensors).
     """
-    from underskin.diagnosis.inference.kernels import log_likelihoods as add
+    from underskin.diagnosis.kernels import log_likelihoods as add
 
     sums = products.summed(levels)
     about_means, numbers = lines.about_means

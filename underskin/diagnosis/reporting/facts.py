@@ -16,9 +16,15 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.localisation import AxisResult, EffectSize
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import kinds, numbers
-from underskin.diagnosis.reporting.d33 import BY_NUISANCES, SEVERAL_ANSWERS, StatedD33, d33_over_answers
-from underskin.diagnosis.reporting.modulus import modulus_over_answers, modulus_under
 from underskin.diagnosis.reporting.numbers import parameters_of, rounded
+from underskin.diagnosis.reporting.quantities import (
+    BY_NUISANCES,
+    SEVERAL_ANSWERS,
+    StatedD33,
+    d33_over_answers,
+    modulus_over_answers,
+    modulus_under,
+)
 from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, law_document
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import KindsTogether
