@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -339,7 +339,7 @@ COLLAPSED_HZ = 30.0  # frequency of a collapsed line; models without frequency d
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Rows of all recordings one after another; SI.
+    """Rows of all recordings one after another, lines of FRFs if not those of `CurveRows`; SI.
 
     `campaign` holds exactly these rows, so that a model composed for it predicts them. `deviation` is the standard
     deviation of real and of imaginary part each, up to the common factor that every hypothesis fits. `scatter` is the
@@ -358,6 +358,10 @@ class Lines:
     smooth: CurveError | None = None  # of curves
     mechanisms: ActiveCatalogue = field(default_factory=ActiveCatalogue)  # that may explain them
 
+    curves: ClassVar[bool] = False  # whether the rows are samples of force
+    parts: ClassVar[int] = 2  # real and imaginary, of a row
+    row_axes: ClassVar[tuple[str, ...]] = ("frequency_hz", "phase")  # along which the rows of a recording run
+
     @property
     def recordings(self) -> int:
         """The number of recordings."""
@@ -367,21 +371,6 @@ class Lines:
     def kind(self) -> Kind:
         """The kind of the recordings; all are of one kind."""
         return kind_of(self.campaign)
-
-    @property
-    def curves(self) -> bool:
-        """Whether the rows are samples of force, not lines of an FRF."""
-        return self.kind != "frf"
-
-    @property
-    def parts(self) -> int:
-        """The number of parts of a row: real and imaginary, or one."""
-        return 1 if self.curves else 2
-
-    @property
-    def row_axes(self) -> tuple[str, ...]:
-        """The axes along which the rows of a recording run."""
-        return ("displacement_mm",) if self.curves else ("frequency_hz", "phase")
 
     @cached_property
     def first(self) -> Indices:
@@ -397,10 +386,9 @@ class Lines:
     def about_means(self) -> tuple[float, int]:
         """Σ|y − ȳ|²/d² about each recording's mean, and the number of real values of the lines, collapsed or not."""
         square, freedom = self.scatter
-        if not self.curves:
-            weight = self.deviation**-2
-            mean = np.add.reduceat(weight * self.value, self.first) / np.add.reduceat(weight, self.first)
-            square += float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
+        weight = self.deviation**-2
+        mean = np.add.reduceat(weight * self.value, self.first) / np.add.reduceat(weight, self.first)
+        square += float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
         return square, 2 * len(self.value) + freedom
 
     @cached_property
@@ -437,26 +425,48 @@ class Lines:
         """Some of the rows, with the noise that they had; recordings without a row are left out."""
         order = np.flatnonzero(rows)
         indices, first = np.unique(self.recording[order], return_index=True)
-        value, frequency = self.value[order], self.frequency[order]
-        ends = [*first[1:].tolist(), len(order)]
-        recordings: list[Recording] = []
-        for number, low, high in zip(indices.tolist(), first.tolist(), ends, strict=True):
-            recording = self.campaign.recordings[number]
-            if isinstance(recording, FrfRecording):
-                recordings.append(FrfRecording.of_lines(recording, frequency[low:high], value[low:high]))
-            else:
-                recordings.append(samples_of(recording, order[low:high] - self.first[number]))
+        rows_of = dict(zip(indices.tolist(), np.split(order, first[1:]), strict=True))
         return replace(
             self,
-            campaign=replace(self.campaign, recordings=tuple(recordings)),
-            value=value,
+            campaign=replace(self.campaign, recordings=tuple(self._with_rows(rows_of))),
+            value=self.value[order],
             deviation=self.deviation[order],
-            frequency=frequency,
-            recording=np.repeat(np.arange(len(recordings)), np.diff([*first, len(order)])),
+            frequency=self.frequency[order],
+            recording=np.repeat(np.arange(len(indices)), np.diff([*first, len(order)])),
             sensor=self.sensor[indices],
-            scatter=(0.0, self.scatter[1] and -len(order)),
+            scatter=(0.0, 0),
             smooth=None if self.smooth is None else self.smooth.part(order),
         )
+
+    def _with_rows(self, rows: Mapping[int, Indices]) -> list[Recording]:
+        """Some of the recordings, by their indices, each with some of its rows."""
+        recordings = frf_recordings(self.campaign)
+        return [
+            FrfRecording.of_lines(recordings[number], self.frequency[part], self.value[part])
+            for number, part in rows.items()
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class CurveRows(Lines):
+    """Samples of force of curves; none stands for others, and a force has no imaginary part."""
+
+    curves: ClassVar[bool] = True
+    parts: ClassVar[int] = 1
+    row_axes: ClassVar[tuple[str, ...]] = ("displacement_mm",)
+
+    @cached_property
+    def about_means(self) -> tuple[float, int]:
+        """0, and the number of samples."""
+        return 0.0, len(self.value)
+
+    def collapsed(self) -> Lines:
+        """The same rows."""
+        return self
+
+    def _with_rows(self, rows: Mapping[int, Indices]) -> list[Recording]:
+        curves = self.campaign.curves
+        return [samples_of(curves[number], part - self.first[number]) for number, part in rows.items()]
 
 
 def lines(
@@ -555,7 +565,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         )
     value = _joined(forces)
     deviation = _joined(deviations)
-    return Lines(
+    return CurveRows(
         campaign=replace(campaign, recordings=tuple(curves)),
         value=value.astype(complex),
         deviation=deviation,
@@ -563,7 +573,6 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         recording=np.repeat(np.arange(len(forces)), [len(force) for force in forces]).astype(np.intp),
         sensor=np.zeros(len(forces), dtype=np.intp),
         noise=LineNoise(deviation, _LEVEL_SD, 0.0),
-        scatter=(0.0, -len(value)),  # a force has no imaginary part
         smooth=CurveError.joined(errors),
     )
 
