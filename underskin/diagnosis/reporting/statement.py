@@ -24,7 +24,6 @@ from underskin.diagnosis.data.names import (
 from underskin.diagnosis.reporting import kinds, numbers
 from underskin.diagnosis.reporting.entries import stage_clause
 from underskin.diagnosis.reporting.facts import Facts
-from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.selection.other_kinds import may_hide
@@ -39,6 +38,7 @@ from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.expressions import TURN, CurveLaw
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw
+from underskin.mechanisms.unlisted.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, acted_on, followed
 from underskin.physics.sphere_law import PARABOLOID
