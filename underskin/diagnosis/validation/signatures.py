@@ -36,6 +36,7 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Array, Floats
 
 _SHAPE_QUANTILES = (0.1, 0.9)  # of the prior of a shape parameter
+_ROWS_AT_ONCE = 1 << 14
 
 
 class Signatures:
@@ -114,9 +115,10 @@ class Signatures:
         )
         square = (means * total) @ means.T
         on_lines = [index for index, (_, rows) in enumerate(self._columns) if rows is lines]
-        if on_lines:
-            columns = np.array([self._columns[index][0] for index in on_lines])
-            about = (columns - means[on_lines][:, lines.recording]) * np.sqrt(weight)
+        for first in range(0, len(weight) if on_lines else 0, _ROWS_AT_ONCE):
+            rows = slice(first, first + _ROWS_AT_ONCE)
+            columns = np.array([self._columns[index][0][rows] for index in on_lines])
+            about = (columns - means[on_lines][:, lines.recording[rows]]) * np.sqrt(weight[rows])
             square[np.ix_(on_lines, on_lines)] += (about @ about.conj().T).real
         return (means * total)[None], square[None]
 
