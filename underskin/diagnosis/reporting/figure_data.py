@@ -144,11 +144,8 @@ def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResp
     gain are fitted."""
     lines, levels = problem.lines, explanation.best.levels
     assert lines.smooth is not None
-    shared = [
-        np.diag(lines.smooth.part(np.arange(span.start, span.stop)).covariance(levels.smooth)) for span in lines.spans
-    ]
-    variance = (levels.level * lines.deviation) ** 2 + np.concatenate(shared) - cell.variance
-    return np.sqrt(np.maximum(variance, 0.0))
+    noise = (levels.level * lines.deviation) ** 2 + (levels.smooth * lines.smooth.scale) ** 2
+    return np.sqrt(np.maximum(noise - cell.variance, 0.0))
 
 
 def _thinned(way: Floats, corners: list[int]) -> Indices:
