@@ -83,17 +83,7 @@ def statement(facts: Facts) -> str:
         second, further = _law_clauses(facts, facts.leading, facts.law)
         last = [*further, _misfit_clause(fit, model, "this law") if of_curves else "", *quoted]
     else:
-        first, *second = answer_clauses(
-            facts.search.answers,
-            verdict,
-            model,
-            presence=facts.presence,
-            mechanisms=facts.mechanisms,
-            idle=facts.idle,
-            doubts=doubts,
-            all_used=not slips,
-            all_tried=not of_tried,
-        )
+        first, *second = _answer_clauses(facts, doubts, all_used=not slips, all_tried=not of_tried)
         last = quoted
         if verdict in ("explained", "no_mismatch"):
             open_questions.insert(0, _reserve(fit))
@@ -124,24 +114,14 @@ def lacking_part(text: str) -> str:
     return text.removeprefix(_INSUFFICIENT).removeprefix(_TO_CORRECT)
 
 
-def answer_clauses(
-    answers: Sequence[Answer],
-    verdict: str,
-    model: str,
-    presence: Sequence[Mapping[str, Any]] = (),
-    mechanisms: Sequence[Mapping[str, Any]] = (),
-    idle: Sequence[str] = (),
-    doubts: Sequence[str] = (),
-    *,
-    all_used: bool = True,
-    all_tried: bool = True,
-) -> list[str]:
+def _answer_clauses(facts: Facts, doubts: Sequence[str], *, all_used: bool, all_tried: bool) -> list[str]:
     """The verdict as a clause, and further clauses on its meaning.
 
-    `presence` and `mechanisms` are the report's, `idle` the mechanisms that may as well have no effect, `doubts` what
-    else speaks against the set, such as a parameter at the bound of its search; `all_used` says that no recording was
-    left out or corrected, `all_tried` that no mechanism that might explain what is left was not tried.
+    `doubts`: what speaks against the set, such as a parameter at the bound of its search; `all_used` says that no
+    recording was left out or corrected, `all_tried` that no mechanism that might explain what is left was not tried.
     """
+    answers, verdict, model = facts.search.answers, facts.verdict, SIMPLEST[facts.problem.kind]
+    presence, mechanisms, idle = facts.presence, facts.mechanisms, facts.idle
     leader = answers[0]
     percent = in_percent(leader.probability)
     rivals = [answer for answer in answers[1:4] if answer.probability > NAMED]
