@@ -546,19 +546,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         curves.append(replace(curve, displacement_mm=displacement, force_n=force, time_s=time))
         forces.append(force)
         deviations.append(deviation)
-        drift = _drift_in_air(seen, columns[1], columns[2] if len(columns) > 2 else None)
-        error = _error(
-            kind,
-            seen,
-            displacement,
-            force,
-            time,
-            path_fraction,
-            drift,
-            contact_samples(columns[0], columns[1], seen)[1],
-            (*_straight_lines(columns[1], counts), np.full(len(force), slow)),
-        )
-        errors.append(error)
+        errors.append(_error(kind, seen, columns, means, path_fraction, counts, slow))
         span = float(np.ptp(displacement)) or 1.0
         abscissae.append(
             _ABSCISSA_RANGE[0] + (_ABSCISSA_RANGE[1] - _ABSCISSA_RANGE[0]) * (displacement - displacement.min()) / span
@@ -613,7 +601,7 @@ def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floa
     return counts, slope, np.add.reduceat((about - slope[block] * offset) ** 2, starts)
 
 
-def _drift_in_air(seen: CurveLandmarks, force: Floats, time: Floats | None) -> float:
+def _drift_in_air(seen: CurveLandmarks, force: Floats, time: Floats | None = None) -> float:
     """The drift [N] of the cell over the whole curve, extrapolated from the air; 0 without a significant drift, or
     without a snap-in to separate the air from the beginning of contact.
 
@@ -635,16 +623,16 @@ def _drift_in_air(seen: CurveLandmarks, force: Floats, time: Floats | None) -> f
 def _error(
     kind: Kind,
     seen: CurveLandmarks,
-    displacement: Floats,
-    force: Floats,
-    time: Floats | None,
+    columns: Sequence[Floats],
+    means: Sequence[Floats],
     path_fraction: Floats,
-    drift: float,
-    end: int,
-    samples: tuple[Floats, Floats, Floats, Floats],
+    counts: Floats,
+    slow: float,
 ) -> CurveError:
-    """The error that the samples of one curve share; `drift` [N] is that in the air, `end` the first sample after an
-    indentation's contact, `samples` as in CurveError."""
+    """The error that the samples of one curve share, from its samples and their `means`; `slow` [N] is the noise that
+    neighbouring samples share."""
+    displacement, force = means[:2]
+    samples = *_straight_lines(columns[1], counts), np.full(len(force), slow)
     largest = float(np.abs(force).max()) or 1.0
     if kind == "compression":
         of_zero = np.full((len(force), 1), ZERO_SD * largest)
@@ -653,14 +641,13 @@ def _error(
     if seen.pull_off is None and seen.snap_in is None:
         in_air &= displacement < displacement[np.argmax(displacement)]
     # Without times, a constant sampling rate is assumed: drift follows the order of samples, not the travel.
-    counts = samples[0]
     order = np.cumsum(counts) - counts / 2
-    in_air |= order > end
+    in_air |= order > contact_samples(columns[0], columns[1], seen)[1]
     scale = np.maximum(np.abs(force), np.where(in_air, _IN_THE_AIR, _AT_CONTACT) * largest)
     zero = largest if seen.has_air else _FEW_FOR_ZERO * largest
-    size = max(USUAL_DRIFT * largest, drift) if seen.has_air else 0.0
-    columns = instrument_columns(displacement, order if time is None else time, zero, size)
-    return CurveError(scale, path_fraction, columns, *samples)
+    size = max(USUAL_DRIFT * largest, _drift_in_air(seen, *columns[1:])) if seen.has_air else 0.0
+    instrument = instrument_columns(displacement, means[2] if len(means) > 2 else order, zero, size)
+    return CurveError(scale, path_fraction, instrument, *samples)
 
 
 def _joined(columns: Sequence[Floats]) -> Floats:
