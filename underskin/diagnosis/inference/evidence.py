@@ -138,22 +138,16 @@ def laplace_at(fitter: Fitter, at: Evaluated) -> Evidence:
         if polished is None:
             break
         at = polished
-    (value,), (mean,), (covariance,) = _quadratics(fitter, at)
+    (value,), (mean,), (covariance,) = mean_integrals(fitter, at)
     (volume,) = level_integrals(fitter, at)
     point = FitPoint(at.points.fit[0], at.points.covariance[0], at.points.sensor_log_gain[0])
     log_evidence, cost = float(value + volume), float(at.cost[0])
     return Evidence(log_evidence, fitter.hypothesis, point, cost, covariance, mean)
 
 
-def mean_integrals(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
-    """Logarithms of the integrals over the mean parameters, with the covariance's held (points,), and the covariance of
-    each quadratic (mean parameters, mean parameters)."""
-    values, _, covariances = _quadratics(fitter, at)
-    return values, covariances
-
-
-def _quadratics(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats], list[Floats]]:
-    """As `mean_integrals`, with the mean of each quadratic (mean parameters,) between them."""
+def mean_integrals(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats], list[Floats]]:
+    """Logarithms of the integrals over the mean parameters, with the covariance's held (points,), and the mean (mean
+    parameters,) and covariance (mean parameters, mean parameters) of each quadratic."""
     values, means, covariances = [], [], []
     indices = np.flatnonzero(fitter.free)
     for number, (information, gradient) in enumerate(zip(*_equations(fitter, at), strict=True)):
@@ -317,7 +311,7 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list
     covariance = grid.points.covariance.copy()
     covariance[:, column] = np.tile(low + (high - low) * (np.arange(_SPREAD_VALUES) + 0.5) / _SPREAD_VALUES, len(at))
     shifted = _with_levels(fitter, grid, covariance)
-    values, means, covariances = _quadratics(fitter, shifted)
+    values, means, covariances = mean_integrals(fitter, shifted)
     row = int(np.searchsorted(np.flatnonzero(fitter.free), index))
     mean = np.array([mean[row] for mean in means])
     deviation = np.sqrt([covariance[row, row] for covariance in covariances])
@@ -359,7 +353,7 @@ def marginalise_curve_noise(evidence: Evidence, indices: Sequence[int]) -> Norma
     covariance[:, [Scatter.GAIN, Scatter.SMOOTH]] = [*product(gain, smooth)]
     shifted = _with_levels(fitter, at[np.zeros(len(covariance), dtype=np.intp)], covariance)
     shifted = shifted[np.flatnonzero(shifted.cost < shifted.cost.min() + NEGLIGIBLE_NATS)]
-    values, means, covariances = _quadratics(fitter, shifted)
+    values, means, covariances = mean_integrals(fitter, shifted)
     free = np.flatnonzero(fitter.free)
     rows = np.searchsorted(free, indices)
     low, high = fitter.low[free], fitter.high[free]

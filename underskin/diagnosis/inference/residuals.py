@@ -249,7 +249,7 @@ def with_hidden_mechanism(
     at = _fitted(held, fit, explanation)
     if not len(at):
         return None
-    values, covariances = mean_integrals(held, at)
+    values, _, covariances = mean_integrals(held, at)
     log_evidence = values + level_integrals(held, at)
     reference = mean_integrals(best.fitter, best.at)[0] + level_integrals(best.fitter, best.at)
     gained = log_evidence - reference

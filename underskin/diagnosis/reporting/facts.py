@@ -89,7 +89,7 @@ class Facts:
         self.diagnosis, self.search, self.problem = diagnosis, diagnosis.search, diagnosis.problem
         self.joined = diagnosis.joined
         self.leader = self.search.answers[0]
-        self.base = next(explanation for explanation in self.search.explanations if not explanation.names)
+        self.base = self.search.null
         self.shown = self.search.fit_behind(self.leader)
         self.traits = kinds.KINDS[self.problem.kind]
 
