@@ -250,9 +250,7 @@ def with_hidden_mechanism(
     if not len(at):
         return None
     values, _, covariances = mean_integrals(held, at)
-    log_evidence = values + level_integrals(held, at)
-    reference = mean_integrals(best.fitter, best.at)[0] + level_integrals(best.fitter, best.at)
-    gained = log_evidence - reference
+    gained = values + level_integrals(held, at) - best.log_evidence
     shares = np.exp(np.minimum(gained, gained - gained.max() + _MOST)) / len(fit)
     index = hypothesis.index(parameter_name)
     spread = marginalise_sensor_spread(held, at, index)
