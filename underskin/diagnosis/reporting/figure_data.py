@@ -19,7 +19,7 @@ from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, recor
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
-from underskin.diagnosis.inference.residuals import Reading
+from underskin.diagnosis.inference.residuals import Reading, row_prediction
 from underskin.diagnosis.localisation import MOST_LINES, axis_values
 from underskin.diagnosis.noise import path_fractions
 from underskin.diagnosis.reporting.facts import DiagnosisResult
@@ -319,7 +319,8 @@ class Thinned:
     def points(self, explanation: Explanation) -> Points:
         """Measured values, and an explanation's prediction with the sensors' fitted gains."""
         lines, levels, reading = self.lines, explanation.best.levels, Reading.of(self.problem, explanation)
-        predicted = reading.value
+        gains = np.exp(explanation.best.sensor_gains)[lines.sensor][lines.recording]
+        predicted = row_prediction(self.problem, explanation) * gains
         plain = plain_reading(self.problem, explanation, predicted.real)
         if plain is not None:
             predicted = plain[1].astype(complex)
