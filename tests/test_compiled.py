@@ -14,7 +14,7 @@ def refuse(*args, **kwargs):
 tempfile.TemporaryFile = refuse
 from underskin.compiled import load_all
 load_all()
-from underskin.diagnosis.inference.kernels import log_likelihoods
+from underskin.diagnosis.kernels import log_likelihoods
 from underskin.surrogate.spline_kernel import sigma_rows
 for function in (log_likelihoods, sigma_rows):
     assert sum(function.stats.cache_hits.values()) == 1, function.stats

@@ -18,7 +18,6 @@ from numba.core import config
 from numba.core.caching import CacheImpl, InTreeCacheLocator
 
 KERNELS = (
-    "underskin.diagnosis.inference.kernels",
     "underskin.diagnosis.kernels",
     "underskin.mechanisms.models.sphere_kernels",
     "underskin.mechanisms.models.sigma_kernels",

@@ -9,7 +9,9 @@ import pytest
 
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
-from tests.support.lean_reports import beside, lean_report, whole_report
+from tests.support.lean_reports import beside, lean_report, quick_diagnosis, whole_report
+from tests.support.sphere_curves import campaign as of_curve
+from tests.support.sphere_curves import pressed, ways
 from underskin.mechanisms import CATALOGUE, compose
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
@@ -87,3 +89,13 @@ def test_quiet_report_says_shown(table: SigmaTable) -> None:
     percents = list(visible(report).values())
     assert percents == sorted(percents)
     assert all(0 < percent < 100 for percent in percents)
+
+
+def test_curve_shows_what_is_not_noise() -> None:
+    """A curve that shows a modulus wrong by less than usual does not say that such a one stays within the noise."""
+    depth = ways(-0.1, 0.3, -0.1)
+    report = quick_diagnosis(of_curve(depth, pressed(depth), skin={"youngs_modulus_mpa": 1.0})).document
+    within_noise = {entry["mechanism"] for entry in report["not_identifiable"] if entry["confounded_with"] == "noise"}
+    assert visible(report)["modulus_error"] < 15.0
+    assert "modulus_error" not in within_noise
+    assert "instrument_compliance" in within_noise

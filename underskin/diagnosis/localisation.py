@@ -1,4 +1,4 @@
-"""Where a misfit is: on which axes, in which region, of which size and shape.
+"""Where a misfit is: on which axes, in which region, and of which size.
 
 Size: over the rows of the region, with weights 1/d², rms² = (Σ|y − m|²/d² − expected noise)/(Σ|m|²/d²), the noise being
 that of lines and of recordings' gains, and mean = Σ Re m*(y − m)/d² over the same. Where the misfit has one sign
@@ -10,23 +10,17 @@ recordings, within sensors or days where there are several. For `frequency_hz` a
 of the lines' residuals change sign by recording. Each statistic is standardised by its own permutations; p-values are
 those of the largest over all axes, (b + 1)/(B + 1) (Westfall and Young 1993). An axis with too few arrangements, or
 that the others determine, is undecidable.
-
-Shape: simple forms over an axis x: power law (x^n), step (at a level of x), periodic (sine and cosine of one period),
-drift (linear in x), over frequency also a peak (a Lorentzian, real and imaginary part free), along a curve a bump (a
-Lorentzian), compared by the Bayesian information criterion. A form is a description, not an explanation.
 """
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines, recording_axes
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.residuals import Residuals, residuals, row_prediction
+from underskin.diagnosis.inference.residuals import Residuals
 from underskin.units import Array, Floats, Indices, Mask
 
 _ONE_SIGN = 0.8
@@ -34,15 +28,14 @@ MOST_LINES = 160  # distinct frequencies, beyond which they are binned
 _DRAWS, _SEED = 1000, 20180207
 
 
-def frequency_bins(frequency: Floats) -> tuple[Indices, Floats]:
-    """Of each row its distinct frequency, or its bin where there are too many, and the frequencies."""
+def _bins(frequency: Floats) -> Indices:
+    """Of each row the number of its distinct frequency, or of its bin where there are too many (rows,)."""
     distinct, line = np.unique(np.round(frequency, 6), return_inverse=True)
     if len(distinct) <= MOST_LINES:
-        return line, distinct
+        return line
     edges = np.geomspace(distinct[0], distinct[-1] * (1 + 1e-9), MOST_LINES + 1)
     line = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, MOST_LINES - 1)
-    used, line = np.unique(line, return_inverse=True)
-    return line, np.sqrt(edges[used] * edges[used + 1])
+    return np.unique(line, return_inverse=True)[1]
 
 
 @dataclass(frozen=True)
@@ -65,9 +58,8 @@ def effect(lines: Lines, predicted: Array, rows: Mask, gain: float, level: float
     def summed(column: Floats) -> Floats:
         return np.bincount(recording, column).astype(float)
 
-    parts = 1 if lines.curves else 2
     size = summed(weight * np.abs(model) ** 2)
-    noise = parts * level**2 * np.bincount(recording) + gain**2 * size
+    noise = lines.parts * level**2 * np.bincount(recording) + gain**2 * size
     square = summed(weight * np.abs(off) ** 2) - noise
     along = summed(weight * (model.conj() * off).real)
     drawn = np.random.default_rng(_SEED).integers(len(size), size=(_DRAWS, len(size)))
@@ -245,10 +237,11 @@ def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator)
     observed, then under each change of signs."""
     if lines.recordings < 6 or len(lines.value) < 2 * lines.recordings:
         return {}
-    line, centres = frequency_bins(lines.frequency)
-    if len(centres) < 2:
+    line = _bins(lines.frequency)
+    count = int(line.max()) + 1
+    if count < 2:
         return {}
-    total = np.bincount(line, residuals.line_weight, len(centres))
+    total = np.bincount(line, residuals.line_weight)
     signs = np.concatenate(
         [np.ones((1, lines.recordings)), random.choice([-1.0, 1.0], (PERMUTATIONS, lines.recordings))]
     )
@@ -257,7 +250,7 @@ def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator)
     if lines.curves:
         parts = {"displacement_mm": residuals.line.real}
     for name, part in parts.items():
-        sums = np.zeros((lines.recordings, len(centres)))
+        sums = np.zeros((lines.recordings, count))
         np.add.at(sums, (lines.recording, line), residuals.line_weight * part)
         statistics[name] = ((signs @ sums) ** 2 / total).sum(axis=1)
     return statistics
@@ -348,132 +341,3 @@ def _smallest_range(column: Array, misfit: Floats) -> list[float | str]:
         if high <= len(levels) and high > low and rows[high] - rows[low] < fewest:
             fewest, best = int(rows[high] - rows[low]), (low, high - 1)
     return [float(levels[end]) for end in best]
-
-
-_GRID = 40
-ALONG_CURVES = {"displacement_mm": ("the displacement", "mm"), "time_s": ("time", "s")}  # in words, and the unit
-_LOGARITHMIC = ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s", "frequency_hz")
-
-
-class FormKind(StrEnum):
-    """A simple form of a residual over one axis."""
-
-    POWER_LAW = "power_law"
-    DRIFT = "drift"
-    STEP = "step"
-    PERIODIC = "periodic"
-    PEAK = "peak"
-    BUMP = "bump"
-
-
-@dataclass(frozen=True)
-class ShapeForm:
-    """A form, its position `at` on the axis (of a periodic form the period; NaN where it has none), and its size.
-
-    The size is in percent of the response, of curves in percent of the largest force. `axis` is a field of the
-    campaign; `component` 0 or 1 is x or y of a position. `gain` is the gain in information over a constant.
-    """
-
-    kind: FormKind
-    at: float
-    size: float
-    axis: str = ""
-    component: int | None = None
-    gain: float = 0.0
-
-
-@dataclass(frozen=True)
-class Shape:
-    """The best form of the residual beyond some mechanisms; None where no simple form fits."""
-
-    beyond: tuple[str, ...]
-    form: ShapeForm | None
-    of_curves: bool
-
-
-def describe(problem: FittingProblem, explanation: Explanation) -> Shape:
-    """The shape of an explanation's residual, on the axis where a form gains most."""
-    forms = (_along_curves if problem.lines.curves else _over_axes)(problem, explanation)
-    best = max(forms, key=lambda form: form.gain, default=None)
-    return Shape(explanation.names, best, problem.lines.curves)
-
-
-def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
-    """The best forms of the residual, relative to each curve's largest force, over displacement and over time."""
-    lines = problem.lines
-    assert lines.smooth is not None
-    relative = (lines.value - row_prediction(problem, explanation)).real / lines.smooth.scale
-    weight = (lines.smooth.scale / lines.deviation) ** 2
-    forms = []
-    for name in ALONG_CURVES:
-        columns = [getattr(recording, name) for recording in lines.campaign.recordings]
-        if all(column is not None for column in columns):
-            forms += _best_form(np.concatenate(columns), relative[:, None], weight, name)
-    return forms
-
-
-def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
-    """The best forms over each of the recordings' axes, and over the lines'."""
-    levels = explanation.best.levels
-    remaining = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
-    forms: list[ShapeForm] = []
-    for name, column in recording_axes(problem.lines.campaign).items():
-        for index in range(column.shape[1]):
-            component = None if column.shape[1] == 1 else index
-            best = _best_form(column[:, index], remaining.gain[:, None], remaining.gain_deviation**-2, name)
-            forms += [replace(form, component=component) for form in best]
-    line, centres = frequency_bins(problem.lines.frequency)
-    if len(centres) >= 6:
-        total = np.bincount(line, remaining.line_weight, len(centres)).astype(float)
-        parts = [
-            np.bincount(line, remaining.line_weight * part, len(centres)) / total
-            for part in (remaining.line.real, remaining.line.imag)
-        ]
-        forms += _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
-    return forms
-
-
-def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> list[ShapeForm]:
-    """The form with the best information criterion, if better than a constant; values (rows, parts)."""
-    if np.ptp(x) <= 0:
-        return []
-    root = np.sqrt(weight)[:, None]
-
-    def misfit(basis: Floats) -> tuple[float, Floats]:
-        design = np.column_stack([np.ones(len(x)), basis])
-        coefficients = np.linalg.lstsq(design * root, values * root, rcond=None)[0]
-        return float((((values - design @ coefficients) * root) ** 2).sum()), coefficients
-
-    plain, _ = misfit(np.zeros((len(x), 0)))
-    best: list[ShapeForm] = []
-    price = np.log(len(x))
-    for basis, shapes, kind, at in _forms(x, axis):
-        square, coefficients = misfit(basis)
-        gain = 0.5 * (plain - square - price * (shapes + basis.shape[1] * values.shape[1]))
-        if gain > (best[0].gain if best else 0.0):
-            size = 100 * float(np.abs(basis @ coefficients[1:]).max() if basis.size else 0.0)
-            best = [ShapeForm(kind, at, size, axis, gain=float(gain))]
-    return best
-
-
-def _forms(x: Floats, axis: str) -> Iterator[tuple[Floats, int, FormKind, float]]:
-    """Basis functions, number of shape parameters, form and position; of logarithmic axes x is the logarithm."""
-    logarithmic = axis in _LOGARITHMIC
-    yield x[:, None], 0, FormKind.POWER_LAW if logarithmic else FormKind.DRIFT, np.nan
-    levels = np.unique(x)
-    for edge in (levels[1:] + levels[:-1])[:: max(1, len(levels) // _GRID)] / 2:
-        yield (x > edge).astype(float)[:, None], 1, FormKind.STEP, float(np.exp(edge) if logarithmic else edge)
-    natural = np.exp(x) if logarithmic else x
-    if len(levels) >= 6:
-        for period in np.ptp(natural) / np.linspace(0.75, min(8.0, len(levels) / 3), _GRID):
-            angle = 2 * np.pi * natural / period
-            yield np.column_stack([np.sin(angle), np.cos(angle)]), 1, FormKind.PERIODIC, float(period)
-    if axis == "frequency_hz":
-        widths = [width for width in (0.05, 0.1, 0.2, 0.4) if width < 0.5 * np.ptp(x)]
-        for centre, width in itertools.product(np.linspace(x.min(), x.max(), 2 * _GRID), widths):
-            offset = (x - centre) / width
-            lorentzian = np.column_stack([np.ones(len(x)), offset]) / (1 + offset**2)[:, None]
-            yield lorentzian, 2, FormKind.PEAK, float(np.exp(centre))
-    if axis in ALONG_CURVES:
-        for centre, width in itertools.product(np.linspace(x.min(), x.max(), _GRID), (0.03, 0.1, 0.3)):
-            yield 1 / (1 + ((x - centre) / (width * np.ptp(x))) ** 2)[:, None], 2, FormKind.BUMP, float(centre)

@@ -1,8 +1,8 @@
 """A campaign's diagnosis: slips → rows with noise → search → location → held-out groups → plan → report."""
 
 import importlib.metadata
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,16 +10,16 @@ import scipy
 
 from underskin.diagnosis.data.dataset import curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.residuals import residuals, row_prediction
-from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, describe, effect, in_region, locate, region
+from underskin.diagnosis.inference.residuals import Residuals, row_prediction
+from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, effect, in_region, locate, region
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.facts import DiagnosisResult
-from underskin.diagnosis.reporting.modulus import modulus_over_answers
+from underskin.diagnosis.reporting.quantities import modulus_over_answers
 from underskin.diagnosis.selection.answers import Search, inside_tables_under_posterior
 from underskin.diagnosis.selection.priors import least_evidence
-from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem
+from underskin.diagnosis.selection.search import KindsTogether, frf_problem, joined, searched_alone
 from underskin.diagnosis.selection.unlisted_search import with_laws
 from underskin.diagnosis.slips.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.slips.inspection import inspect
@@ -31,9 +31,7 @@ from underskin.diagnosis.validation.cross_validation import (
     largest_floor_percent,
     nearest_law_findings,
 )
-from underskin.diagnosis.validation.curve_spread import curve_spread_findings
-from underskin.diagnosis.validation.declared_thickness import thickness_findings
-from underskin.diagnosis.validation.imitation import odds_of_imitated_laws
+from underskin.diagnosis.validation.curve_checks import curve_spread_findings, odds_of_imitated_laws, thickness_findings
 from underskin.diagnosis.validation.signatures import (
     Signatures,
     confounding,
@@ -53,7 +51,7 @@ from underskin.recordings.curve_preparation import as_other_load, prepared
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
-_KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")  # the first one present gives the verdict
+_OF_CURVES: tuple[Kind, ...] = ("indentation", "compression")  # the first one present gives the verdict without FRFs
 _LEAST_RECORDINGS = 3  # FRFs: of two, d33 absorbs what is common, and the scatter of gain the difference
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
@@ -77,98 +75,92 @@ def diagnose(
 
     Raises InvalidInput where one of those is not in the catalogue.
     """
-    diagnosis = _diagnose(prepared(campaign).campaign, table, progress, limits, ActiveCatalogue(without))
+    run = _Run(table, progress, limits, ActiveCatalogue(without))
+    diagnosis = _diagnose(prepared(campaign).campaign, run)
     return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))
 
 
-def _diagnose(
-    campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits, mechanisms: ActiveCatalogue
-) -> DiagnosisResult:
-    progress(0.05)
+@dataclass(frozen=True)
+class _Run:
+    """What all steps of a diagnosis share."""
+
+    table: SigmaTable
+    progress: Progress
+    limits: RigLimits
+    mechanisms: ActiveCatalogue
+
+
+def _diagnose(campaign: Campaign, run: _Run) -> DiagnosisResult:
+    run.progress(0.05)
     within_limits = without_extremes(campaign)
     declared = campaign.skin.d33_pc_per_n
-    partial = DiagnosisResult(campaign.name, within_limits.findings, _provenance(table, mechanisms), declared)
+    partial = DiagnosisResult(campaign.name, within_limits.findings, _provenance(run), declared)
     if within_limits.findings and within_limits.lacking:
         return replace(partial, lacking=within_limits.lacking)
     campaign = within_limits.campaign
-    kinds = [kind for kind in _KINDS if any(recording.kind == kind for recording in campaign.recordings)]
+    has_frfs, present = bool(campaign.of(FrfRecording)), {curve.kind for curve in campaign.curves}
     curves: dict[Kind, Campaign] = {}
+    kinds = [kind for kind in _OF_CURVES if kind in present]
     for kind in kinds:
-        if kind == "frf":
-            continue
         consistent = without_inconsistent(campaign, kind)
         partial = partial.with_findings(*consistent.findings)
-        if consistent.findings and consistent.lacking and kind == kinds[0]:
+        if consistent.findings and consistent.lacking and not has_frfs and kind == kinds[0]:
             return replace(partial, lacking=consistent.lacking)
         if curve_lines(consistent.campaign, kind).recordings:
             curves[kind] = consistent.campaign
-    if kinds and "frf" not in kinds and not curves:
-        return replace(partial, lacking=Lacking(Lack.NO_CURVE))
-    if "frf" in kinds or not curves:
-        return _diagnose_frf(
-            partial, campaign, table, mechanisms, OtherKinds(curves, table, mechanisms.without), progress, limits
-        )
-    kind = next(iter(curves))
-    other_kinds = OtherKinds(
-        {other: curves_of_kind for other, curves_of_kind in curves.items() if other != kind}, table, mechanisms.without
-    )
-    return _diagnose_curves(partial, curves[kind], kind, table, mechanisms, other_kinds, progress, limits)
+    if has_frfs or not kinds:
+        return _diagnose_frf(partial, campaign, curves, run)
+    return _diagnose_curves(partial, curves, run) if curves else replace(partial, lacking=Lacking(Lack.NO_CURVE))
 
 
 def _diagnose_frf(
-    partial: DiagnosisResult,
-    campaign: Campaign,
-    table: SigmaTable,
-    mechanisms: ActiveCatalogue,
-    other_kinds: OtherKinds,
-    progress: Progress,
-    limits: RigLimits,
+    partial: DiagnosisResult, campaign: Campaign, curves: Mapping[Kind, Campaign], run: _Run
 ) -> DiagnosisResult:
-    frf = tuple(recording for recording in campaign.recordings if isinstance(recording, FrfRecording))
-    inspection = inspect(replace(campaign, recordings=frf), table)
-    joined: KindsTogether | None = None
+    """By the FRFs, together with curves of other kinds."""
+    frfs = replace(campaign, recordings=tuple(campaign.of(FrfRecording)))
+    inspection, together = inspect(frfs, run.table), None
+    other_kinds = [] if inspection.lacking else searched_alone(curves, run.table, run.mechanisms.without)
     while not inspection.lacking:
-        joined = other_kinds.joined(*frf_problem(inspection.campaign, inspection.uneven, table, mechanisms))
+        problem, fitted = frf_problem(inspection.campaign, inspection.uneven, run.table, run.mechanisms)
+        together = joined(problem, other_kinds, fitted)
         if not inspection.beyond:
             break
-        beyond = inspection.beyond & inside_tables_under_posterior(joined.problem, joined.search)
+        beyond = inspection.beyond & inside_tables_under_posterior(together.problem, together.search)
         if beyond == inspection.beyond:
             break
-        inspection = inspect(replace(campaign, recordings=frf), table, beyond)
+        inspection = inspect(frfs, run.table, beyond)
     partial = replace(partial.with_findings(*inspection.findings), level_unsure=inspection.unsure)
-    if joined is None or inspection.lacking:
+    if together is None or inspection.lacking:
         return replace(partial, lacking=inspection.lacking)
-    problem, result = joined.problem, joined.search
-    result = replace(result, laws=tuple(with_laws(problem, result)))
-    return _complete(replace(partial, joined=joined), problem, result, progress, limits)
+    return _complete(partial, _with_unlisted(together), run)
 
 
-def _diagnose_curves(
-    partial: DiagnosisResult,
-    campaign: Campaign,
-    kind: Kind,
-    table: SigmaTable,
-    mechanisms: ActiveCatalogue,
-    other_kinds: OtherKinds,
-    progress: Progress,
-    limits: RigLimits,
-) -> DiagnosisResult:
+def _diagnose_curves(partial: DiagnosisResult, curves: Mapping[Kind, Campaign], run: _Run) -> DiagnosisResult:
+    """By the first kind of curves, together with the others."""
+    (kind, campaign), *others = curves.items()
     partial = partial.with_findings(*(event for curve in campaign.curves for event in contact_events(curve)))
+    other_kinds = searched_alone(dict(others), run.table, run.mechanisms.without)
 
-    def searched(curves: Campaign) -> KindsTogether:
-        active = ActiveCatalogue(mechanisms.without)
-        active.bind(curves, table, kind)
-        return other_kinds.joined(FittingProblem(replace(curve_lines(curves, kind), mechanisms=active), table))
+    def searched(recorded: Campaign) -> KindsTogether:
+        active = ActiveCatalogue(run.mechanisms.without)
+        active.bind(recorded, run.table, kind)
+        return joined(FittingProblem(replace(curve_lines(recorded, kind), mechanisms=active), run.table), other_kinds)
 
-    joined = searched(campaign)
+    together = searched(campaign)
     if (other_load := as_other_load(campaign)) is not None:
-        campaign, joined, findings = _pulled_or_pressed((campaign, joined), (other_load, searched(other_load)))
+        campaign, together, findings = _pulled_or_pressed((campaign, together), (other_load, searched(other_load)))
         partial = partial.with_findings(*findings)
-    problem, result = joined.problem, joined.search
-    result = replace(result, laws=tuple(with_laws(problem, result)))
+    together = _with_unlisted(together)
+    problem, result = together.problem, together.search
     modulus = modulus_over_answers(result, problem, result.fit_behind(result.answers[0]))
     partial = partial.with_findings(*thickness_findings(campaign, problem, result, modulus))
-    return _complete(replace(partial, curves=campaign, joined=joined), problem, result, progress, limits)
+    return _complete(replace(partial, curves=campaign), together, run)
+
+
+def _with_unlisted(together: KindsTogether) -> KindsTogether:
+    """With the unlisted laws that may matter among the rivals."""
+    laws = tuple(with_laws(together.problem, together.search))
+    return replace(together, search=replace(together.search, laws=laws))
 
 
 _Searched = tuple[Campaign, KindsTogether]
@@ -195,24 +187,23 @@ def _pulled_or_pressed(stated: _Searched, other: _Searched) -> tuple[Campaign, K
     return *other, [Finding(Reason.COUNTED_AS_OTHER_LOAD, curve.id, "force_n", arguments)]
 
 
-def _complete(
-    partial: DiagnosisResult, problem: FittingProblem, result: Search, progress: Progress, limits: RigLimits
-) -> DiagnosisResult:
+def _complete(partial: DiagnosisResult, together: KindsTogether, run: _Run) -> DiagnosisResult:
     """All steps after the search."""
-    progress(0.65)
+    problem, result = together.problem, together.search
+    run.progress(0.65)
     signatures = Signatures(problem)
     confounded = confounding(signatures)
-    progress(0.7)
+    run.progress(0.7)
     null = result.null
     result = replace(result, unlisted_odds=_unlisted_odds(partial, problem, result, null))
     leader = result.answers[0]
     stated = result.fit_behind(leader)
     axes, ranges, size = _locate(problem, null, stated.best.levels)
-    progress(0.8)
+    run.progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
     supported = [explanation for explanation in ranked if result.is_supported(explanation)]
     groups = held_out(problem, result, supported, null)
-    progress(0.95)
+    run.progress(0.95)
     floor = largest_floor_percent(problem, null, groups)
     if leader.explanation is null and floor > _LARGEST_FLOOR:
         return replace(partial, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
@@ -221,14 +212,13 @@ def _complete(
         return replace(partial, lacking=Lacking(Lack.FEW_TO_AGREE, few), few=result, problem=problem)
     undescribed = leader.explanation is None and result.law is None
     partial = partial.with_findings(*_scatter_findings(problem, stated))
-    shape = describe(problem, stated) if undescribed else None
     partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
-    determining = frozenset() if partial.joined is None else partial.joined.determining_modulus(stated.names)
     if leader.explanation is not None:
         partial = partial.with_findings(*curve_spread_findings(problem, stated))
     return replace(
         partial.with_findings(*above_noise(problem, stated, groups)),
         search=result,
+        joined=together,
         problem=problem,
         axes=axes,
         region=ranges,
@@ -236,9 +226,8 @@ def _complete(
         groups=groups,
         confounded=remaining_confounding(confounded, result.answers),
         power=power(signatures, stated, result.supported),
-        shifts=hidden_shifts(problem, signatures, stated, result.supported, determining),
-        shape=shape,
-        plan=plan(problem, result, limits),
+        shifts=hidden_shifts(problem, signatures, stated, result.supported, together.determining_modulus(stated.names)),
+        plan=plan(problem, result, run.limits),
     )
 
 
@@ -247,7 +236,7 @@ def _locate(
 ) -> tuple[list[AxisResult], dict[str, list[float | str]], EffectSize]:
     """Where the recordings deviate from the base model, and by how much there; `levels` are those of the answer."""
     gain = float(np.clip(levels.gain, 0.005, 0.05))
-    against_base = residuals(problem, null, gain, levels.position)
+    against_base = Residuals.of(problem, null, gain, levels.position)
     axes = locate(problem.lines, against_base)
     ranges = region(problem.lines, against_base, axes)
     prediction = row_prediction(problem, null)
@@ -298,13 +287,13 @@ def with_refused(diagnosis: DiagnosisResult, problems: Sequence[RecordingProblem
     return replace(diagnosis, findings=(*refused(problems), *diagnosis.findings), lacking=lacking)
 
 
-def _provenance(table: SigmaTable, mechanisms: ActiveCatalogue) -> dict[str, Any]:
+def _provenance(run: _Run) -> dict[str, Any]:
     return {
         "underskin": importlib.metadata.version("underskin"),
         "numpy": np.__version__,
         "scipy": scipy.__version__,
-        "tables": {"sigma": table.sha256},
+        "tables": {"sigma": run.table.sha256},
         "seed": SEED,
         **({"mechanisms": dict(CATALOGUE.packages)} if CATALOGUE.packages else {}),
-        **({"without": list(mechanisms.without)} if mechanisms.without else {}),
+        **({"without": list(run.mechanisms.without)} if run.mechanisms.without else {}),
     }

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -89,8 +89,7 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
             continue
         if not agree(name, values):
             columns_by_axis[name] = _scaled(name, values)[:, None]
-    frf = [recording for recording in recordings if isinstance(recording, FrfRecording)]
-    if frf:
+    if frf := campaign.of(FrfRecording):
         columns_by_axis["position_mm"] = 1e3 * offsets(campaign)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
         columns_by_axis["sensor"] = np.array([centres[recording.sensor] for recording in frf])
@@ -340,7 +339,7 @@ COLLAPSED_HZ = 30.0  # frequency of a collapsed line; models without frequency d
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Rows of all recordings one after another; SI.
+    """Rows of all recordings one after another, lines of FRFs if not those of `CurveRows`; SI.
 
     `campaign` holds exactly these rows, so that a model composed for it predicts them. `deviation` is the standard
     deviation of real and of imaginary part each, up to the common factor that every hypothesis fits. `scatter` is the
@@ -359,6 +358,10 @@ class Lines:
     smooth: CurveError | None = None  # of curves
     mechanisms: ActiveCatalogue = field(default_factory=ActiveCatalogue)  # that may explain them
 
+    curves: ClassVar[bool] = False  # whether the rows are samples of force
+    parts: ClassVar[int] = 2  # real and imaginary, of a row
+    row_axes: ClassVar[tuple[str, ...]] = ("frequency_hz", "phase")  # along which the rows of a recording run
+
     @property
     def recordings(self) -> int:
         """The number of recordings."""
@@ -368,16 +371,6 @@ class Lines:
     def kind(self) -> Kind:
         """The kind of the recordings; all are of one kind."""
         return kind_of(self.campaign)
-
-    @property
-    def curves(self) -> bool:
-        """Whether the rows are samples of force, not lines of an FRF."""
-        return self.kind != "frf"
-
-    @property
-    def row_axes(self) -> tuple[str, ...]:
-        """The axes along which the rows of a recording run."""
-        return ("displacement_mm",) if self.curves else ("frequency_hz", "phase")
 
     @cached_property
     def first(self) -> Indices:
@@ -393,10 +386,9 @@ class Lines:
     def about_means(self) -> tuple[float, int]:
         """Σ|y − ȳ|²/d² about each recording's mean, and the number of real values of the lines, collapsed or not."""
         square, freedom = self.scatter
-        if not self.curves:
-            weight = self.deviation**-2
-            mean = np.add.reduceat(weight * self.value, self.first) / np.add.reduceat(weight, self.first)
-            square += float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
+        weight = self.deviation**-2
+        mean = np.add.reduceat(weight * self.value, self.first) / np.add.reduceat(weight, self.first)
+        square += float(np.sum(weight * np.abs(self.value - mean[self.recording]) ** 2))
         return square, 2 * len(self.value) + freedom
 
     @cached_property
@@ -433,26 +425,48 @@ class Lines:
         """Some of the rows, with the noise that they had; recordings without a row are left out."""
         order = np.flatnonzero(rows)
         indices, first = np.unique(self.recording[order], return_index=True)
-        value, frequency = self.value[order], self.frequency[order]
-        ends = [*first[1:].tolist(), len(order)]
-        recordings: list[Recording] = []
-        for number, low, high in zip(indices.tolist(), first.tolist(), ends, strict=True):
-            recording = self.campaign.recordings[number]
-            if isinstance(recording, FrfRecording):
-                recordings.append(FrfRecording.of_lines(recording, frequency[low:high], value[low:high]))
-            else:
-                recordings.append(samples_of(recording, order[low:high] - self.first[number]))
+        rows_of = dict(zip(indices.tolist(), np.split(order, first[1:]), strict=True))
         return replace(
             self,
-            campaign=replace(self.campaign, recordings=tuple(recordings)),
-            value=value,
+            campaign=replace(self.campaign, recordings=tuple(self._with_rows(rows_of))),
+            value=self.value[order],
             deviation=self.deviation[order],
-            frequency=frequency,
-            recording=np.repeat(np.arange(len(recordings)), np.diff([*first, len(order)])),
+            frequency=self.frequency[order],
+            recording=np.repeat(np.arange(len(indices)), np.diff([*first, len(order)])),
             sensor=self.sensor[indices],
-            scatter=(0.0, self.scatter[1] and -len(order)),
+            scatter=(0.0, 0),
             smooth=None if self.smooth is None else self.smooth.part(order),
         )
+
+    def _with_rows(self, rows: Mapping[int, Indices]) -> list[Recording]:
+        """Some of the recordings, by their indices, each with some of its rows."""
+        recordings = frf_recordings(self.campaign)
+        return [
+            FrfRecording.of_lines(recordings[number], self.frequency[part], self.value[part])
+            for number, part in rows.items()
+        ]
+
+
+@dataclass(frozen=True, eq=False)
+class CurveRows(Lines):
+    """Samples of force of curves; none stands for others, and a force has no imaginary part."""
+
+    curves: ClassVar[bool] = True
+    parts: ClassVar[int] = 1
+    row_axes: ClassVar[tuple[str, ...]] = ("displacement_mm",)
+
+    @cached_property
+    def about_means(self) -> tuple[float, int]:
+        """0, and the number of samples."""
+        return 0.0, len(self.value)
+
+    def collapsed(self) -> Lines:
+        """The same rows."""
+        return self
+
+    def _with_rows(self, rows: Mapping[int, Indices]) -> list[Recording]:
+        curves = self.campaign.curves
+        return [samples_of(curves[number], part - self.first[number]) for number, part in rows.items()]
 
 
 def lines(
@@ -466,71 +480,37 @@ def lines(
     `predicted`: the same lines and a prediction of the rows (rows,), whose change with frequency is no noise. The
     `campaign` of the result holds only the FRF recordings with finite lines.
     """
-    measured = _measured(campaign, uneven or {})
-    recording_index = np.repeat(np.arange(len(measured.recordings)), measured.counts).astype(np.intp)
-    noise = line_noise(
-        measured.value,
-        measured.frequency,
-        recording_index,
-        measured.coherence,
-        measured.unevenness,
-        None if predicted is None else predicted[1],
-    )
+    measured = []
+    for recording in campaign.of(FrfRecording):
+        of_recording = lines_of(recording)
+        order = np.argsort(of_recording.frequency, kind="stable")
+        order = order[np.isfinite(of_recording.values[order]) & np.isfinite(of_recording.frequency[order])]
+        if len(order):
+            measured.append((recording, of_recording, order))
+    value = np.concatenate([*(found.values[order] for _, found, order in measured), np.zeros(0)]).astype(complex)
+    frequency = _joined([found.frequency[order] for _, found, order in measured])
+    coherence = _joined([found.coherence_or_nan[order] for _, found, order in measured])
+    even = [(uneven or {}).get(recording.id, np.ones(len(found.values))) for recording, found, _ in measured]
+    unevenness = _joined([column[order] for column, (_, _, order) in zip(even, measured, strict=True)])
+    recording_index = np.repeat(np.arange(len(measured)), [len(order) for _, _, order in measured]).astype(np.intp)
+    change = None if predicted is None else predicted[1]
+    noise = line_noise(value, frequency, recording_index, coherence, unevenness, change)
     if predicted is not None:
         return replace(predicted[0], deviation=noise.deviation, noise=noise)
-    segments = zip(measured.recordings, np.cumsum(measured.counts).tolist(), measured.counts, strict=True)
+    numbers = {sensor.id: index for index, sensor in enumerate(campaign.skin.sensors)}
     recordings = tuple(
-        FrfRecording.of_lines(recording, measured.frequency[end - count : end], measured.value[end - count : end])
-        for recording, end, count in segments
+        FrfRecording.of_lines(recording, found.frequency[order], found.values[order])
+        for recording, found, order in measured
     )
     return Lines(
         campaign=replace(campaign, recordings=recordings),
-        value=measured.value,
+        value=value,
         deviation=noise.deviation,
-        frequency=measured.frequency,
+        frequency=frequency,
         recording=recording_index,
-        sensor=measured.sensor,
+        sensor=np.array([numbers[recording.sensor] for recording in recordings], dtype=np.intp),
         noise=noise,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Measured:
-    """The recordings with finite lines, their sensors and numbers of lines, and columns over all these lines (rows,);
-    `coherence` is NaN where not given.
-    """
-
-    recordings: list[FrfRecording]
-    sensor: Indices
-    counts: list[int]
-    value: Complexes
-    frequency: Floats
-    coherence: Floats
-    unevenness: Floats
-
-
-def _measured(campaign: Campaign, uneven: Mapping[str, Floats]) -> _Measured:
-    numbers = {sensor.id: index for index, sensor in enumerate(campaign.skin.sensors)}
-    recordings: list[FrfRecording] = []
-    values, frequencies, coherences, unevens = [], [], [], []
-    for recording in campaign.recordings:
-        if not isinstance(recording, FrfRecording):
-            continue
-        measured = lines_of(recording)
-        order = np.argsort(measured.frequency, kind="stable")
-        order = order[np.isfinite(measured.values[order]) & np.isfinite(measured.frequency[order])]
-        if len(order) == 0:
-            continue
-        recordings.append(recording)
-        values.append(measured.values[order])
-        frequencies.append(measured.frequency[order])
-        coherences.append(measured.coherence_or_nan[order])
-        unevens.append(uneven.get(recording.id, np.ones(len(measured.values)))[order])
-    sensor = np.array([numbers[recording.sensor] for recording in recordings], dtype=np.intp)
-    counts = [len(value) for value in values]
-    value = np.concatenate([*values, np.zeros(0, dtype=complex)])
-    columns = (np.concatenate([*column, np.zeros(0)]) for column in (frequencies, coherences, unevens))
-    return _Measured(recordings, sensor, counts, value, *columns)
 
 
 _READING, _FULL_SCALE = 2e-3, 1e-3  # of a testing machine, without samples in the air
@@ -549,11 +529,9 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
     """The thinned curves of one kind; curves with fewer than five finite samples are left out."""
     curves: list[CurveRecording] = []
     forces, deviations, abscissae, errors = [], [], [], []
-    for curve in campaign.recordings:
-        if not isinstance(curve, CurveRecording) or curve.kind != kind:
-            continue
+    for curve in campaign.curves:
         columns = finite_samples(curve)
-        if len(columns[0]) < _LEAST_SAMPLES:
+        if curve.kind != kind or len(columns[0]) < _LEAST_SAMPLES:
             continue
         seen = curve_landmarks(*columns)
         force_zero = seen.zero if kind == "indentation" else 0.0
@@ -568,26 +546,14 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         curves.append(replace(curve, displacement_mm=displacement, force_n=force, time_s=time))
         forces.append(force)
         deviations.append(deviation)
-        drift = _drift_in_air(seen, columns[1], columns[2] if len(columns) > 2 else None)
-        error = _error(
-            kind,
-            seen,
-            displacement,
-            force,
-            time,
-            path_fraction,
-            drift,
-            contact_samples(columns[0], columns[1], seen)[1],
-            (*_straight_lines(columns[1], counts), np.full(len(force), slow)),
-        )
-        errors.append(error)
+        errors.append(_error(kind, seen, columns, means, path_fraction, counts, slow))
         span = float(np.ptp(displacement)) or 1.0
         abscissae.append(
             _ABSCISSA_RANGE[0] + (_ABSCISSA_RANGE[1] - _ABSCISSA_RANGE[0]) * (displacement - displacement.min()) / span
         )
     value = _joined(forces)
     deviation = _joined(deviations)
-    return Lines(
+    return CurveRows(
         campaign=replace(campaign, recordings=tuple(curves)),
         value=value.astype(complex),
         deviation=deviation,
@@ -595,7 +561,6 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         recording=np.repeat(np.arange(len(forces)), [len(force) for force in forces]).astype(np.intp),
         sensor=np.zeros(len(forces), dtype=np.intp),
         noise=LineNoise(deviation, _LEVEL_SD, 0.0),
-        scatter=(0.0, -len(value)),  # a force has no imaginary part
         smooth=CurveError.joined(errors),
     )
 
@@ -636,7 +601,7 @@ def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floa
     return counts, slope, np.add.reduceat((about - slope[block] * offset) ** 2, starts)
 
 
-def _drift_in_air(seen: CurveLandmarks, force: Floats, time: Floats | None) -> float:
+def _drift_in_air(seen: CurveLandmarks, force: Floats, time: Floats | None = None) -> float:
     """The drift [N] of the cell over the whole curve, extrapolated from the air; 0 without a significant drift, or
     without a snap-in to separate the air from the beginning of contact.
 
@@ -658,16 +623,16 @@ def _drift_in_air(seen: CurveLandmarks, force: Floats, time: Floats | None) -> f
 def _error(
     kind: Kind,
     seen: CurveLandmarks,
-    displacement: Floats,
-    force: Floats,
-    time: Floats | None,
+    columns: Sequence[Floats],
+    means: Sequence[Floats],
     path_fraction: Floats,
-    drift: float,
-    end: int,
-    samples: tuple[Floats, Floats, Floats, Floats],
+    counts: Floats,
+    slow: float,
 ) -> CurveError:
-    """The error that the samples of one curve share; `drift` [N] is that in the air, `end` the first sample after an
-    indentation's contact, `samples` as in CurveError."""
+    """The error that the samples of one curve share, from its samples and their `means`; `slow` [N] is the noise that
+    neighbouring samples share."""
+    displacement, force = means[:2]
+    samples = *_straight_lines(columns[1], counts), np.full(len(force), slow)
     largest = float(np.abs(force).max()) or 1.0
     if kind == "compression":
         of_zero = np.full((len(force), 1), ZERO_SD * largest)
@@ -676,14 +641,13 @@ def _error(
     if seen.pull_off is None and seen.snap_in is None:
         in_air &= displacement < displacement[np.argmax(displacement)]
     # Without times, a constant sampling rate is assumed: drift follows the order of samples, not the travel.
-    counts = samples[0]
     order = np.cumsum(counts) - counts / 2
-    in_air |= order > end
+    in_air |= order > contact_samples(columns[0], columns[1], seen)[1]
     scale = np.maximum(np.abs(force), np.where(in_air, _IN_THE_AIR, _AT_CONTACT) * largest)
     zero = largest if seen.has_air else _FEW_FOR_ZERO * largest
-    size = max(USUAL_DRIFT * largest, drift) if seen.has_air else 0.0
-    columns = instrument_columns(displacement, order if time is None else time, zero, size)
-    return CurveError(scale, path_fraction, columns, *samples)
+    size = max(USUAL_DRIFT * largest, _drift_in_air(seen, *columns[1:])) if seen.has_air else 0.0
+    instrument = instrument_columns(displacement, means[2] if len(means) > 2 else order, zero, size)
+    return CurveError(scale, path_fraction, instrument, *samples)
 
 
 def _joined(columns: Sequence[Floats]) -> Floats:

@@ -15,13 +15,22 @@ the profile of the posterior, which need not be Gaussian, ends it (`profile_end`
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from scipy.special import log_ndtr
 
 from underskin.diagnosis.inference.fit import Fitter, Scatter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Points, Tangent, cell_response
+from underskin.diagnosis.inference.hypothesis import (
+    FLAT,
+    Evaluated,
+    FitPoint,
+    Hypothesis,
+    Points,
+    Tangent,
+    cell_response,
+)
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
 from underskin.mechanisms.models.frf import FrfModel
@@ -35,7 +44,6 @@ _REMAINING_GAIN = 1.0  # gain in log posterior that polishing may leave
 _LEAST_BOUNDS_TERM = -50.0  # nats: bounds around the point reduce an integral by less, and never raise it
 NEGLIGIBLE_NATS = 12.0  # of log evidence behind the best: odds of 1 to 160,000, which no other set makes up for
 _LEAST_EIGENVALUE = 1e-11  # of correlations or their information: less is rounding
-FLAT = 1e-3  # standard deviations of a quadratic, at least, within a parameter's bounds: keeps H invertible
 
 
 @dataclass(frozen=True)
@@ -99,6 +107,11 @@ class Evidence:
         if isinstance(model, FrfModel):
             return model.relative_place_slopes(self.point.fit)
         return np.zeros((2, self.hypothesis.lines.recordings))
+
+    def position_variance(self, position: float) -> Floats:
+        """The variance of each recording's relative level by this positioning scatter [m] (recordings,)."""
+        first_order = position**2 * (self.relative_place_slopes**2).sum(axis=0)
+        return np.asarray(first_order + 0.5 * position**4 * self.hypothesis.curvature.square)
 
     @cached_property
     def levels(self) -> NoiseLevels:
@@ -304,13 +317,10 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list
     covariance = grid.points.covariance.copy()
     covariance[:, column] = np.tile(low + (high - low) * (np.arange(_SPREAD_VALUES) + 0.5) / _SPREAD_VALUES, len(at))
     shifted = _with_levels(fitter, grid, covariance)
-    values, covariances = mean_integrals(fitter, shifted)
-    free = np.flatnonzero(fitter.free)
-    mean_index = int(np.searchsorted(free, index))
-    information, gradient = fitter.posterior_equations(shifted)
-    step = np.linalg.solve(information[:, free[:, None], free], gradient[:, free, None])[:, mean_index, 0]
-    mean = shifted.points.fit[:, index] + step
-    deviation = np.sqrt([covariance[mean_index, mean_index] for covariance in covariances])
+    values, means, covariances = _quadratics(fitter, shifted)
+    row = int(np.searchsorted(np.flatnonzero(fitter.free), index))
+    mean = np.array([mean[row] for mean in means])
+    deviation = np.sqrt([covariance[row, row] for covariance in covariances])
     return [
         NormalMixture(_shares(values[rows]), mean[rows], deviation[rows])
         for rows in (slice(first, first + _SPREAD_VALUES) for first in range(0, len(values), _SPREAD_VALUES))
@@ -346,10 +356,7 @@ def marginalise_curve_noise(evidence: Evidence, indices: Sequence[int]) -> Norma
     smooth = at.points.covariance[0, Scatter.SMOOTH] + smooth_sd * _SMOOTH_STEPS
     smooth = smooth[(smooth >= sizes.low) & (smooth <= sizes.high)]
     covariance = np.tile(at.points.covariance, (len(gain) * len(smooth), 1))
-    covariance[:, Scatter.GAIN], covariance[:, Scatter.SMOOTH] = (
-        np.repeat(gain, len(smooth)),
-        np.tile(smooth, len(gain)),
-    )
+    covariance[:, [Scatter.GAIN, Scatter.SMOOTH]] = [*product(gain, smooth)]
     shifted = _with_levels(fitter, at[np.zeros(len(covariance), dtype=np.intp)], covariance)
     shifted = shifted[np.flatnonzero(shifted.cost < shifted.cost.min() + NEGLIGIBLE_NATS)]
     values, means, covariances = _quadratics(fitter, shifted)

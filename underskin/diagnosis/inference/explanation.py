@@ -313,7 +313,7 @@ class FittingProblem:
         self.gain = gain
         self.kind = kind = lines.kind
         self.table = table
-        self.collapsed = lines.collapsed() if kind == "frf" else lines
+        self.collapsed = lines.collapsed()
         none = np.zeros(lines.recordings)
         self.curvature = curvature(self.collapsed, table) if kind == "frf" else Curvature(none, none)
         self._hypotheses: dict[tuple[frozenset[str], bool, bool], Hypothesis] = {}

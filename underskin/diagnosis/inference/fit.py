@@ -25,7 +25,7 @@ from underskin.diagnosis.inference.hypothesis import (
 )
 from underskin.diagnosis.inference.least_squares import LeastSquares, between_samples
 from underskin.diagnosis.inference.products import FrfProducts, Products
-from underskin.diagnosis.noise import DISCREPANCY, GAIN_PRIOR, POSITION_PRIOR, START_GAIN, USUAL, SeveralLevels
+from underskin.diagnosis.noise import DISCREPANCY, GAIN_PRIOR, START_GAIN, USUAL, SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.units import Floats, Indices, Mask
@@ -155,21 +155,21 @@ class Fitter:
     def levels(self, covariance: Floats) -> SeveralLevels:
         """The noise levels (…, 1) of covariance parameters (…, parameters)."""
         values = np.exp(covariance[..., None])
-        shape = (*covariance.shape[:-1], 1)
-        values_by_name = {parameter.name: values[..., column, :] for column, parameter in enumerate(self.covariance)}
-        pickup = self.model.pickup
+        none = np.zeros((*covariance.shape[:-1], 1))
+        named = [(parameter.name, values[..., column, :]) for column, parameter in enumerate(self.covariance)]
+        shared, pickup = dict(named[: self._shared_count]), self.model.pickup
         return SeveralLevels(
-            gain=values[..., Scatter.GAIN, :],
-            level=values[..., Scatter.LEVEL, :],
-            position=values[..., Scatter.POSITION, :] if self.has_position_scatter else np.zeros(shape),
-            spread=np.full(shape, SENSOR_SPREAD) if self._spread is None else values[..., self._spread, :],
-            pickup=None if pickup is None else pickup.deviation(values_by_name),
-            smooth=values[..., Scatter.SMOOTH, :] if self.lines.curves else np.zeros(shape),
+            gain=shared["gain"],
+            level=shared["level"],
+            position=shared.get("position", none),
+            spread=none + SENSOR_SPREAD if self._spread is None else values[..., self._spread, :],
+            pickup=None if pickup is None else pickup.deviation(dict(named[self._shared_count :])),
+            smooth=shared.get("smooth", none),
         )
 
     def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
         """The costs (points, sets) with covariance parameters (points, sets, parameters), at fixed predictions."""
-        from underskin.diagnosis.inference.kernels import log_priors
+        from underskin.diagnosis.kernels import log_priors
 
         pickup = self.model.pickup
         if pickup is not None or self.lines.curves:
@@ -298,11 +298,7 @@ class Fitter:
         # Bounds may differ from the parent's: where the contact sticks, a snap-in confines its beginning.
         nuisances = np.clip(nuisances, self.low[mechanisms:], self.high[mechanisms:])
         fit = np.concatenate([mechanism_fits, np.tile(nuisances, (points, 1))], axis=1)
-        shared = [GAIN_PRIOR.middle, 0.0]
-        if self.has_position_scatter:
-            shared.append(POSITION_PRIOR.middle)
-        if self.lines.curves:
-            shared.append(self.hypothesis.smooth.middle)
+        shared = [parameter.prior.middle for parameter in self.covariance[: self._shared_count]]
         covariance = np.concatenate([np.tile(shared, (points, 1)), fit[:, self.covariance_indices]], axis=1)
         return Points(fit, covariance, np.tile(self.no_sensor_log_gain, (points, 1)))
 

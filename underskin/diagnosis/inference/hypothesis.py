@@ -68,7 +68,7 @@ def log_likelihoods(
 
     `sensor_log_gain` is (points, sensors).
     """
-    from underskin.diagnosis.inference.kernels import log_likelihoods as add
+    from underskin.diagnosis.kernels import log_likelihoods as add
 
     sums = products.summed(levels)
     about_means, numbers = lines.about_means
@@ -98,7 +98,7 @@ class Tangent:
         self, lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, sensor_log_gain: Floats
     ) -> None:
         """`levels` (points, 1, 1), `sensor_log_gain` (points, sensors)."""
-        self._products, self._levels, self._curvature = products, levels, curvature
+        self._products, self._levels = products, levels
         self._sensors = lines.sensors
         self._log_gains = sensor_log_gain[:, None, lines.sensor]
         self._k2, p2 = levels.level**2, levels.position**2
@@ -122,21 +122,20 @@ class Tangent:
         """The most probable b of each sensor (points, sensors)."""
         return np.asarray(self._sensor_gains[:, 0])
 
-    def projections(self, position: float) -> tuple[Floats, Floats, Floats]:
-        """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter [m],
-        with weights 1/d² (without κ)."""
-        log_gain, level = self._log_gains[0, 0], self._products.level[0]
-        uu, uy = (np.broadcast_to(of[0, 0], level.shape) for of in (self._sums.uu, self._sums.uy))
-        a = level * np.exp(log_gain + 0.5 * position**2 * self._curvature.laplacian)
-        return a * uu, uy - a * (1 - log_gain) * uu, uu
+    @property
+    def projections(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Re u*u, Re u*m and Re u*r (recordings,), and Re u*J (P, recordings), of the first point's recordings: m the
+        mean, r the residual, J the derivatives by the parameters."""
+        slopes = self._slope_projections / self._k2
+        return self._uu[0, 0], (self._a * self._uu)[0, 0], self._ur[0, 0], slopes[0]
 
     @cached_property
     def _slope_sums(self) -> SlopeSums | None:
         return self._products.slope_sums(self._levels)
 
     @property
-    def slope_projections(self) -> Floats:
-        """Re u*J (points, P, recordings) of the derivatives by the parameters, with the same weights."""
+    def _slope_projections(self) -> Floats:
+        """Re u*J (points, P, recordings) of the derivatives by the parameters, with weights 1/d² (without κ)."""
         by_level, sums = self._products.level_slopes, self._slope_sums
         along = 0.0 if by_level is None else by_level * self._factor * self._sums.uu
         return np.asarray(along if sums is None else along + sums.uv * self._a)
@@ -177,7 +176,7 @@ class Tangent:
         if by_level is not None and sums is not None:
             mixed = leveled @ (self._a * sums.uv).swapaxes(1, 2)
             square = square + mixed + mixed.swapaxes(1, 2)
-        return self.information(self.slope_projections, square), gradient[..., 0]
+        return self.information(self._slope_projections, square), gradient[..., 0]
 
     @property
     def _gradients(self) -> list[Floats]:
@@ -302,6 +301,7 @@ class Evaluated(AtPoints):
         return self[np.array([np.argmin(self.cost)])]
 
 
+FLAT = 1e-3  # standard deviations of a quadratic, at least, within a parameter's bounds: keeps information invertible
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
 _CURVE_LEVELS = (0.3, 5.0)  # least accuracy of a cell; larger noise would exceed the differences of neighbours
 
@@ -369,6 +369,11 @@ class Hypothesis:
             freedom = parameter.prior.freedom if isinstance(parameter.prior, Normal) else np.inf
             rows.append((*curvature_of_prior(parameter), parameter.log_height, freedom))
         return np.array(rows).T
+
+    @cached_property
+    def prior_precision(self) -> Floats:
+        """Of the parameters' priors (parameters,), at least `FLAT` standard deviations within the bounds."""
+        return np.asarray(self.priors[0] + (FLAT / np.maximum(np.ptp(self.bounds, axis=0), 1e-300)) ** 2)
 
     @cached_property
     def spans(self) -> dict[str, slice]:

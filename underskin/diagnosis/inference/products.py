@@ -168,7 +168,7 @@ class CurveProducts(AtPoints):
 
     def summed(self, levels: SeveralLevels) -> Sums:
         """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
-        from underskin.diagnosis.inference.kernels import curve_sums
+        from underskin.diagnosis.kernels import curve_sums
 
         lines, force = self.lines, contiguous(self.force)
         ratio, level = (levels.smooth / levels.level)[..., 0], levels.level[..., 0]

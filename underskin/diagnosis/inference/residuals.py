@@ -16,9 +16,8 @@ from typing import Self
 
 import numpy as np
 
-from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import (
-    FLAT,
+    Evidence,
     level_integrals,
     marginalise_sensor_spread,
     mean_integrals,
@@ -26,64 +25,137 @@ from underskin.diagnosis.inference.evidence import (
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.gaussian import NormalMixture
-from underskin.diagnosis.inference.hypothesis import Evaluated, Points
+from underskin.diagnosis.inference.hypothesis import Evaluated, Points, cell_response
 from underskin.errors import InvalidInput
 from underskin.halton import halton
+from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.curves import CurveModel
+from underskin.mechanisms.models.frf import FAINT, FrfModel
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter
 from underskin.prediction.pressed_skin import declared_skin, log_slopes
 from underskin.recordings.campaign import Tolerances, frf_of
-from underskin.units import Array, Floats, Indices, to_si
-
-
-@dataclass(frozen=True)
-class Residuals:
-    """Residuals at an explanation's most probable parameters."""
-
-    gain: Floats  # (recordings,) relative
-    gain_deviation: Floats  # (recordings,) expected sd: gain scatter, positioning and lines
-    line: Array  # (rows,) complex, relative
-    line_weight: Floats  # (rows,) 1/variance of real and of imaginary part
+from underskin.units import Array, Floats, Indices, Mask, to_si
 
 
 def row_prediction(problem: FittingProblem, explanation: Explanation) -> Array:
     """The explanation's prediction on all rows."""
-    return on_rows(problem.lines, explanation.best.prediction.value)
+    predicted, lines = explanation.best.prediction.value, problem.lines
+    return predicted if len(predicted) == len(lines.value) else predicted[lines.recording]
 
 
-def on_rows(lines: Lines, column: Array) -> Array:
-    """A column of all rows, or of the recordings (recordings,), as one of the rows (rows,)."""
-    return column if len(column) == len(lines.value) else column[lines.recording]
+@dataclass(frozen=True)
+class Residuals:
+    """Residuals at an explanation's most probable parameters: of recordings over the model, and of lines over their
+    recording's best real multiple of it."""
+
+    gain: Floats  # (recordings,) relative
+    gain_deviation: Floats  # (recordings,) expected sd: gain scatter, positioning and lines
+    line: Array  # (rows,) complex, relative
+    line_weight: Floats  # (rows,) 1/variance of real and of imaginary part, without the noise's level
+
+    @classmethod
+    def of(cls, problem: FittingProblem, explanation: Explanation, gain: float = 0.0, position: float = 0.0) -> Self:
+        """With these scatters of gain (relative) and of position [m]; mains pick-up adds to the variance of lines."""
+        lines, prediction, best = problem.lines, row_prediction(problem, explanation), explanation.best
+        further = 0.0 if best.prediction.pickup_rows is None else best.pickup_variance / best.levels.level**2
+        precision = 1 / (lines.deviation**2 + further)
+        along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
+        size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
+        fitted = prediction * (along / size)[lines.recording]
+        line = (lines.value - fitted) / np.where(np.abs(fitted) > 0, fitted, 1.0)
+        deviation = np.sqrt(gain**2 + best.position_variance(position) + 1 / size)
+        return cls(along / size - 1, deviation, line, precision * np.abs(fitted) ** 2)
 
 
-def line_residuals(problem: FittingProblem, explanation: Explanation) -> tuple[Array, Floats]:
-    """Each line divided by its recording's best real multiple of the model, minus 1, and its weight 1/variance.
+@dataclass(frozen=True)
+class Reading:
+    """What instruments are expected to read with their most probable gains: the `value` of each row, the `variance` of
+    its real and of its imaginary part, and that of a `relative` factor on it (rows,)."""
 
-    The variance excludes the noise's level; mains pick-up adds to it.
+    value: Array
+    variance: Floats
+    relative: Floats
+
+    @classmethod
+    def of(cls, problem: FittingProblem, explanation: Explanation, fitted: Mask | None = None) -> Self:
+        """Of all rows of a problem by an explanation of those that are `fitted`, by default all of them."""
+        lines, levels, fit = problem.lines, explanation.best.levels, explanation.point.fit
+        model = problem.hypothesis(explanation.names, has_position_scatter=False, all_lines=True).model
+        noise = (levels.level * lines.deviation) ** 2
+        if not isinstance(model, FrfModel):
+            assert lines.smooth is not None
+            force = model.predict(fit).value.real
+            cell = cell_response(lines, levels, force, fitted)
+            noise = noise + cell.variance + (levels.smooth * lines.smooth.scale) ** 2
+            return cls(cell.reading(lines, force), noise, np.zeros(len(force)))
+        prediction = model.predict(fit, slopes=False, place=False)
+        known = np.unique(lines.sensor[lines.recording if fitted is None else lines.recording[fitted]])
+        gains, spread = np.zeros(lines.sensors.shape[1]), np.full(lines.sensors.shape[1], levels.spread)
+        gains[known], spread[known] = explanation.best.sensor_gains[known], 0.0
+        p2, curvature = levels.position**2, problem.curvature  # a contact on an extremum of σ feels it in second order
+        factor = np.exp(gains[lines.sensor] + 0.5 * p2 * curvature.laplacian)
+        moved = p2 * (model.relative_place_slopes(fit) ** 2).sum(axis=0) + 0.5 * p2**2 * curvature.square
+        relative = levels.gain**2 + spread[lines.sensor] ** 2 + moved
+        value = prediction.value * factor[lines.recording]
+        return cls(value, noise + prediction.pickup_variance, relative[lines.recording])
+
+    @property
+    def of_parts(self) -> Floats:
+        """The variance of real and of imaginary part (2, rows)."""
+        return np.asarray(self.variance + self.relative * np.array([self.value.real, self.value.imag]) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class LevelResiduals:
+    """The relative residual r of each recording's level, its prior of the parameters and of the sensors' gains
+    marginalised: C = V + F Fᵀ, V the `variance` by the fit's noise, F the change by one prior deviation of each.
+
+    Attributes: C⁻¹ = V⁻¹ − Tᵀ T with the `projector` T (columns, recordings), `weighted` C⁻¹ r (recordings,), and the
+    `least` V of a careful rig over that of the fit.
     """
-    lines, prediction, best = problem.lines, row_prediction(problem, explanation), explanation.best
-    first = lines.first
-    further = 0.0 if best.prediction.pickup_rows is None else best.pickup_variance / best.levels.level**2
-    precision = 1 / (lines.deviation**2 + further)
-    along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, first)
-    size = np.add.reduceat(precision * np.abs(prediction) ** 2, first)
-    fitted = prediction * (along / size)[lines.recording]
-    safe = np.where(np.abs(fitted) > 0, fitted, 1.0)
-    return (lines.value - fitted) / safe, precision * np.abs(fitted) ** 2
 
+    residual: Floats
+    variance: Floats
+    projector: Floats
+    weighted: Floats
+    least: float
 
-def residuals(problem: FittingProblem, explanation: Explanation, gain: float, position: float) -> Residuals:
-    """The residuals, with their expected scatters: `gain` (relative) and `position` [m]."""
-    lines = problem.lines
-    prediction = row_prediction(problem, explanation)
-    precision = lines.deviation**-2
-    size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
-    along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
-    relative = explanation.best.relative_place_slopes
-    position_variance = position**2 * (relative**2).sum(axis=0) + 0.5 * position**4 * problem.curvature.square
-    line, weight = line_residuals(problem, explanation)
-    return Residuals(along / size - 1, np.sqrt(gain**2 + position_variance + 1 / size), line, weight)
+    @classmethod
+    def of(cls, best: Evidence) -> Self:
+        """Of a fit to FRFs."""
+        square, size, along, by_parameters = best.tangent.projections
+        size = np.where(np.abs(size) > FAINT * np.abs(size).max(), size, FAINT * np.abs(size).max())
+        slopes = (by_parameters / size).T
+        centre = np.array([parameter.start for parameter in best.hypothesis.model.parameters]) - best.point.fit
+        residual = along / size - slopes @ centre
+        scatter = best.position_variance(best.levels.position) + square / size**2
+        variance = best.levels.gain**2 + scatter
+        least = min(float(np.median((GAIN_RANGE[0] ** 2 + scatter) / variance)), 1.0)
+        deviations = best.hypothesis.prior_precision**-0.5
+        columns = np.hstack([slopes * deviations, best.levels.spread * best.hypothesis.lines.sensors])
+        weighed = columns.T / variance
+        lower = np.linalg.cholesky(weighed @ columns + np.eye(columns.shape[1]))
+        projector = np.asarray(np.linalg.solve(lower, weighed), dtype=float)
+        weighted = residual / variance - (projector @ residual) @ projector
+        return cls(residual, variance, projector, weighted, least)
+
+    @property
+    def chi2(self) -> float:
+        """rᵀ C⁻¹ r."""
+        return float(self.residual @ self.weighted)
+
+    @property
+    def freedom(self) -> float:
+        """The number of recordings, less what parameters and sensors' gains take up of it."""
+        return float(len(self.residual) - (self.variance * (self.projector**2).sum(axis=0)).sum())
+
+    def products(self, changes: Floats) -> tuple[Floats, Floats]:
+        """XᵀC⁻¹X (sets, features, features) and XᵀC⁻¹r (sets, features) of sets of relative changes X of the levels
+        (sets, recordings, features)."""
+        rows = changes.swapaxes(1, 2)
+        taken_up = self.projector @ changes
+        return (rows / self.variance) @ changes - taken_up.swapaxes(1, 2) @ taken_up, rows @ self.weighted
 
 
 def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
@@ -112,7 +184,7 @@ class Linearised:
         fitter, covariance = Fitter(hypothesis), (noise or explanation).point.covariance
         at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)), slopes=False)
         information = fitter.tangent(at.points, at.products).information_on_forces(np.concatenate([slopes, changes]))
-        return cls(information, hypothesis.priors[0] + (FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
+        return cls(information, hypothesis.prior_precision)
 
     @property
     def of_changes(self) -> Floats:

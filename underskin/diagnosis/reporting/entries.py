@@ -1,4 +1,4 @@
-"""Words of a report's entries: location, shape of the residual, rivals, next recordings.
+"""Words of a report's entries: location, rivals, next recordings.
 
 Written for experimenters: percentages and values with units, no further statistics.
 """
@@ -9,11 +9,8 @@ from typing import Any
 from underskin.diagnosis.data.dataset import WORDS
 from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.localisation import (
-    ALONG_CURVES,
     AxisResult,
     EffectSize,
-    FormKind,
-    Shape,
     Undecidable,
 )
 from underskin.diagnosis.planning.optimal_design import WRONG_MODULUS, NextRecordings
@@ -22,34 +19,6 @@ from underskin.findings.formatting import capital, in_digits, in_percent, listed
 
 _MOST_UNLISTED = P_NOT_IN_MODEL_SPACE + 1e-3  # largest probability of none_of_these where no unlisted law shows
 _IN_PERCENT = 90.0  # beyond it an effect is given as a factor
-
-
-def shape_clause(shape: Shape | None) -> str:
-    """A clause on the residual that no mechanism describes; empty where it was not analysed."""
-    if shape is None:
-        return ""
-    form, looks = shape.form, "has no simple form over one axis"
-    if form is not None:
-        axis_words, unit = ALONG_CURVES[form.axis] if shape.of_curves else WORDS[form.axis]
-        if form.component is not None and not shape.of_curves:
-            axis_words += f" ({'xy'[form.component]})"
-        words = _FORMS[form.kind].format(at=form.at, unit=f" {unit}" if unit else "")
-        of = " of the largest force" if shape.of_curves else ""
-        looks = f"looks like {words}, up to {in_digits(form.size, 2)} %{of} over {axis_words}"
-    if not shape.beyond:
-        return f"what remains {looks}"
-    explain = "explains" if len(shape.beyond) == 1 else "explain"
-    return f"{in_words(shape.beyond)} {explain} part of the misfit; what remains {looks}"
-
-
-_FORMS: Mapping[FormKind, str] = {
-    FormKind.POWER_LAW: "a power law",
-    FormKind.DRIFT: "a drift",
-    FormKind.STEP: "a step at {at:.4g}{unit}",
-    FormKind.PERIODIC: "a periodic change of period {at:.3g}{unit}",
-    FormKind.PEAK: "a peak or notch at {at:.3g}{unit}",
-    FormKind.BUMP: "a bump at {at:.3g}{unit}",
-}
 
 
 def why_not(answer: Answer, leader: Answer) -> str:

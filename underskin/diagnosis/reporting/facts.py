@@ -13,12 +13,18 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.localisation import AxisResult, EffectSize, Shape
+from underskin.diagnosis.localisation import AxisResult, EffectSize
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import kinds, numbers
-from underskin.diagnosis.reporting.d33 import BY_NUISANCES, SEVERAL_ANSWERS, StatedD33, d33_over_answers
-from underskin.diagnosis.reporting.modulus import modulus_over_answers, modulus_under
 from underskin.diagnosis.reporting.numbers import parameters_of, rounded
+from underskin.diagnosis.reporting.quantities import (
+    BY_NUISANCES,
+    SEVERAL_ANSWERS,
+    StatedD33,
+    d33_over_answers,
+    modulus_over_answers,
+    modulus_under,
+)
 from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, law_document
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import KindsTogether
@@ -60,7 +66,6 @@ class DiagnosisResult:
     confounded: Sequence[Confounding] = ()
     power: Sequence[Power] = ()
     shifts: Sequence[HiddenShift] = ()
-    shape: Shape | None = None  # of the residual, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
     joined: KindsTogether | None = None  # with recordings of other kinds; not None where there is a search

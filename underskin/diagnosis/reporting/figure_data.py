@@ -19,7 +19,7 @@ from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, recor
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
-from underskin.diagnosis.inference.residuals import on_rows, row_prediction
+from underskin.diagnosis.inference.residuals import Reading
 from underskin.diagnosis.localisation import MOST_LINES, axis_values
 from underskin.diagnosis.noise import path_fractions
 from underskin.diagnosis.reporting.facts import DiagnosisResult
@@ -144,11 +144,8 @@ def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResp
     gain are fitted."""
     lines, levels = problem.lines, explanation.best.levels
     assert lines.smooth is not None
-    shared = [
-        np.diag(lines.smooth.part(np.arange(span.start, span.stop)).covariance(levels.smooth)) for span in lines.spans
-    ]
-    variance = (levels.level * lines.deviation) ** 2 + np.concatenate(shared) - cell.variance
-    return np.sqrt(np.maximum(variance, 0.0))
+    noise = (levels.level * lines.deviation) ** 2 + (levels.smooth * lines.smooth.scale) ** 2
+    return np.sqrt(np.maximum(noise - cell.variance, 0.0))
 
 
 def _thinned(way: Floats, corners: list[int]) -> Indices:
@@ -188,12 +185,12 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
     """The fitted recordings, the one with the largest misfit after first; at most `MOST_RECORDINGS`, those with the
     largest misfit, equally many of each sensor."""
     lines, recordings = problem.lines, frf_recordings(problem.lines.campaign)
-    predicted = {"before": _predicted(problem, before), "after": _predicted(problem, after)}
+    readings = {"before": Reading.of(problem, before), "after": Reading.of(problem, after)}
     misfits = {
-        role: [_misfit_percent(lines.value[span], rows[span]) for span in lines.spans]
-        for role, rows in predicted.items()
+        role: [_misfit_percent(lines.value[span], reading.value[span]) for span in lines.spans]
+        for role, reading in readings.items()
     }
-    deviation = _frf_deviation(problem, after, predicted["after"])
+    deviation = np.sqrt(readings["after"].of_parts)
     chosen = _worst([recording.sensor for recording in recordings], misfits["after"])
     unit = KINDS["frf"].per_si
     most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, MOST_LINES))
@@ -207,31 +204,12 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
                 count=span.stop - span.start,
                 frequency_hz=lines.frequency[rows],
                 measured=unit * lines.value[rows],
-                predicted={role: unit * values[rows] for role, values in predicted.items()},
+                predicted={role: unit * reading.value[rows] for role, reading in readings.items()},
                 deviation=unit * deviation[:, rows],
                 misfits={role: values[index] for role, values in misfits.items()},
             )
         )
     return shown
-
-
-def _predicted(problem: FittingProblem, explanation: Explanation) -> Complexes:
-    """Prediction of each row [C/N], with the sensors' gains and the effect of position scatter on the mean."""
-    lines, best = problem.lines, explanation.best
-    gain = best.sensor_gains[lines.sensor] + 0.5 * best.levels.position**2 * problem.curvature.laplacian
-    predicted: Complexes = row_prediction(problem, explanation) * np.exp(gain)[lines.recording]
-    return predicted
-
-
-def _frf_deviation(problem: FittingProblem, explanation: Explanation, predicted: Complexes) -> Floats:
-    """Standard deviation of real and imaginary part about the prediction (2, rows) [C/N]: noise of the lines, mains
-    pick-up, gain and position of the recording."""
-    lines, best = problem.lines, explanation.best
-    levels = best.levels
-    of_line = (levels.level * lines.deviation) ** 2 + on_rows(lines, best.pickup_variance)
-    position_variance = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
-    relative = levels.gain**2 + position_variance + 0.5 * levels.position**4 * problem.curvature.square
-    return np.sqrt(of_line + relative[lines.recording] * np.array([predicted.real, predicted.imag]) ** 2)
 
 
 def _misfit_percent(measured: Complexes, predicted: Complexes) -> float:
@@ -340,14 +318,14 @@ class Thinned:
 
     def points(self, explanation: Explanation) -> Points:
         """Measured values, and an explanation's prediction with the sensors' fitted gains."""
-        lines, best = self.lines, explanation.best
-        levels = best.levels
-        gains = np.exp(best.sensor_gains)[lines.sensor][lines.recording]
-        predicted = row_prediction(self.problem, explanation) * gains
+        lines, levels, reading = self.lines, explanation.best.levels, Reading.of(self.problem, explanation)
+        predicted = reading.value
         plain = plain_reading(self.problem, explanation, predicted.real)
         if plain is not None:
             predicted = plain[1].astype(complex)
-        variance = (levels.level**2 / self._total) + self._mean(self._row_variance(explanation))
+        shared = reading.variance - (levels.level * lines.deviation) ** 2
+        shared += np.maximum(reading.relative - levels.gain**2, 0.0) * np.abs(reading.value) ** 2
+        variance = levels.level**2 / self._total + self._mean(shared)
         unit = KINDS[lines.kind].per_si
         return Points(
             recording=self.recording,
@@ -385,18 +363,6 @@ class Thinned:
     def axes(self) -> list[str]:
         """The axes of the points, those of the rows first."""
         return [*self.lines.row_axes[: int(self.by_line)], *recording_axes(self.lines.campaign)]
-
-    def _row_variance(self, explanation: Explanation) -> Floats:
-        """Variance from positioning, mains pick-up and shared errors of samples (rows,)."""
-        prediction, levels = explanation.best.prediction, explanation.best.levels
-        variance = np.zeros(len(prediction.value))
-        if self.lines.smooth is not None:
-            variance += (levels.smooth * self.lines.smooth.scale) ** 2
-        squared_slopes = (explanation.best.relative_place_slopes**2).sum(axis=0)[
-            explanation.best.hypothesis.lines.recording
-        ]
-        variance += levels.position**2 * squared_slopes * np.abs(prediction.value) ** 2
-        return on_rows(self.lines, variance + explanation.best.pickup_variance)
 
     def _mean(self, column: Floats) -> Floats:
         return np.bincount(self._point, self._weight * column) / self._total

@@ -19,7 +19,7 @@ from underskin.diagnosis.inference.evidence import levels_covariance, profile_en
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import parameter_slices
-from underskin.diagnosis.inference.residuals import residuals, row_prediction, with_hidden_mechanism
+from underskin.diagnosis.inference.residuals import Residuals, row_prediction, with_hidden_mechanism
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import declared_laws
 from underskin.diagnosis.slips.levels import LEAST_LEVELS
@@ -415,7 +415,7 @@ def outlying_sensors(problem: FittingProblem, shown: Explanation) -> str:
     if _SPREAD not in shown.names:
         return ""
     levels = shown.best.levels
-    of_recordings = residuals(problem, shown, levels.gain, levels.position)
+    of_recordings = Residuals.of(problem, shown, levels.gain, levels.position)
     indices, sensor = np.unique(problem.lines.sensor, return_inverse=True)
     if len(indices) < LEAST_LEVELS:
         return ""

@@ -13,10 +13,10 @@ import numpy as np
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.localisation import reaches_all_along
 from underskin.diagnosis.reporting import entries, numbers, statement
-from underskin.diagnosis.reporting.d33 import StatedD33
 from underskin.diagnosis.reporting.facts import DiagnosisResult, Facts
 from underskin.diagnosis.reporting.headline import headline
 from underskin.diagnosis.reporting.numbers import rounded
+from underskin.diagnosis.reporting.quantities import StatedD33
 from underskin.diagnosis.reporting.unlisted_law import confirming
 from underskin.diagnosis.selection.answers import Search, remainder
 from underskin.findings.formatting import in_digits

@@ -22,9 +22,8 @@ from underskin.diagnosis.data.names import (
     quantity_in_words,
 )
 from underskin.diagnosis.reporting import kinds, numbers
-from underskin.diagnosis.reporting.entries import shape_clause, stage_clause
+from underskin.diagnosis.reporting.entries import stage_clause
 from underskin.diagnosis.reporting.facts import Facts
-from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.selection.other_kinds import may_hide
@@ -39,6 +38,7 @@ from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.expressions import TURN, CurveLaw
 from underskin.mechanisms.unlisted.grammar import FrequencyLaw
+from underskin.mechanisms.unlisted.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, acted_on, followed
 from underskin.physics.sphere_law import PARABOLOID
@@ -83,23 +83,11 @@ def statement(facts: Facts) -> str:
         second, further = _law_clauses(facts, facts.leading, facts.law)
         last = [*further, _misfit_clause(fit, model, "this law") if of_curves else "", *quoted]
     else:
-        first, *second = answer_clauses(
-            facts.search.answers,
-            verdict,
-            model,
-            presence=facts.presence,
-            mechanisms=facts.mechanisms,
-            idle=facts.idle,
-            doubts=doubts,
-            all_used=not slips,
-            all_tried=not of_tried,
-        )
+        first, *second = _answer_clauses(facts, doubts, all_used=not slips, all_tried=not of_tried)
         last = quoted
         if verdict in ("explained", "no_mismatch"):
             open_questions.insert(0, _reserve(fit))
         if verdict == "unexplained":
-            # The shape of the residual is not stated where a mechanism that may explain it was not tried
-            second += ["" if facts.untried else shape_clause(facts.diagnosis.shape)]
             second += [_misfit_clause(fit, model)] if of_curves else []
         elif of_curves:
             settled = verdict != "ambiguous"
@@ -126,24 +114,14 @@ def lacking_part(text: str) -> str:
     return text.removeprefix(_INSUFFICIENT).removeprefix(_TO_CORRECT)
 
 
-def answer_clauses(
-    answers: Sequence[Answer],
-    verdict: str,
-    model: str,
-    presence: Sequence[Mapping[str, Any]] = (),
-    mechanisms: Sequence[Mapping[str, Any]] = (),
-    idle: Sequence[str] = (),
-    doubts: Sequence[str] = (),
-    *,
-    all_used: bool = True,
-    all_tried: bool = True,
-) -> list[str]:
+def _answer_clauses(facts: Facts, doubts: Sequence[str], *, all_used: bool, all_tried: bool) -> list[str]:
     """The verdict as a clause, and further clauses on its meaning.
 
-    `presence` and `mechanisms` are the report's, `idle` the mechanisms that may as well have no effect, `doubts` what
-    else speaks against the set, such as a parameter at the bound of its search; `all_used` says that no recording was
-    left out or corrected, `all_tried` that no mechanism that might explain what is left was not tried.
+    `doubts`: what speaks against the set, such as a parameter at the bound of its search; `all_used` says that no
+    recording was left out or corrected, `all_tried` that no mechanism that might explain what is left was not tried.
     """
+    answers, verdict, model = facts.search.answers, facts.verdict, SIMPLEST[facts.problem.kind]
+    presence, mechanisms, idle = facts.presence, facts.mechanisms, facts.idle
     leader = answers[0]
     percent = in_percent(leader.probability)
     rivals = [answer for answer in answers[1:4] if answer.probability > NAMED]
@@ -251,7 +229,7 @@ def _reserve(fit: Mapping[str, Any]) -> str:
 def _depths_clause(facts: Facts) -> str:
     """A clause on the depth of indentation over radius and declared thickness; empty for other recordings."""
     model, campaign = facts.shown.model, facts.problem.lines.campaign
-    curves = [recording for recording in campaign.recordings if isinstance(recording, IndentationRecording)]
+    curves = campaign.of(IndentationRecording)
     if not curves or not isinstance(model, CurveModel):
         return ""
     contacts = facts.shown.point.fit[model.contact_points].tolist()

@@ -325,8 +325,7 @@ def _scatter(problem: FittingProblem, leading: LeadingLaw, base: int) -> float:
     """Relative standard deviation of one recording's charge, from its gain, position and lines."""
     best, collapsed = leading.explanation.best, problem.collapsed
     line = best.levels.level * collapsed.deviation[base] / max(float(np.abs(collapsed.value[base])), 1e-300)
-    position = best.levels.position * float(np.hypot(*best.relative_place_slopes[:, base]))
-    return float(np.sqrt(best.levels.gain**2 + position**2 + line**2))
+    return float(np.sqrt(best.levels.gain**2 + best.position_variance(best.levels.position)[base] + line**2))
 
 
 def _conditions_of(recording: FrfConditions) -> dict[str, Any]:

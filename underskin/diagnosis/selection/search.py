@@ -17,7 +17,6 @@ the skin's is rarer than a modulus that was declared wrong.
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -281,52 +280,44 @@ class KindsTogether:
     def determining_modulus(self, names: Sequence[str]) -> frozenset[Kind]:
         """The other kinds that determine the modulus, under a set of mechanisms, as well as d33 needs it."""
         curves = self.other_kinds
-        kinds = () if curves is None else curves.kinds
-        return frozenset(
-            kind.kind
-            for kind in kinds
-            if curves is not None and curves.posterior(kind, names).modulus_deviation < _DETERMINED
-        )
+        if curves is None:
+            return frozenset()
+        kinds = ((kind.kind, curves.posterior(kind, names)) for kind in curves.kinds)
+        return frozenset(kind for kind, posterior in kinds if posterior.modulus_deviation < _DETERMINED)
 
 
-class OtherKinds:
-    """The curves of other kinds than the one that gives the verdict."""
+def searched_alone(campaigns: Mapping[Kind, Campaign], table: SigmaTable, without: Sequence[str]) -> list[OtherKind]:
+    """The curves of other kinds than the one that gives the verdict, each searched as if it were alone; `without` are
+    the mechanisms that are left out."""
+    kinds = []
+    for kind, campaign in campaigns.items():
+        problem = free_modulus_problem(campaign, kind, table, without)
+        alone = search(problem)
+        kinds.append(OtherKind(kind, problem, alone.explanations, alone.unsupported))
+    return kinds
 
-    def __init__(self, campaigns: Mapping[Kind, Campaign], table: SigmaTable, without: Sequence[str]) -> None:
-        """By kind; `without` are the mechanisms that are left out."""
-        self._campaigns, self._table, self._without = campaigns, table, without
 
-    @cached_property
-    def _kinds(self) -> list[OtherKind]:
-        """Each searched as if it were alone."""
-        kinds = []
-        for kind, campaign in self._campaigns.items():
-            problem = free_modulus_problem(campaign, kind, self._table, self._without)
-            alone = search(problem)
-            kinds.append(OtherKind(kind, problem, alone.explanations, alone.unsupported))
-        return kinds
-
-    def joined(self, problem: FittingProblem, fitted: Sequence[Explanation] = ()) -> KindsTogether:
-        """The recordings of the `problem`, of which some sets may be `fitted` already, together with these curves or
-        alone, whichever is more probable: both under the same noise."""
-        apart = search(problem, fitted)
-        if not self._campaigns:
-            return KindsTogether(problem, apart)
-        curves = CurveLikelihood(self._kinds, apart.explanations)
-        best = [
-            frozenset(answer.explanation.names)
-            for answer in apart.answers[:_OF_THE_OTHERS]
-            if answer.explanation is not None
-        ]
-        joint = FittingProblem(problem.lines, problem.table, curves)
-        together = search(joint, required_sets=curves.required_sets(problem.lines, best))
-        log_apart = _log_apart(apart, curves) + np.log(_DIFFERENT_MATERIAL)
-        log_together = together.log_total + np.log1p(-_DIFFERENT_MATERIAL)
-        contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
-        alone = KindsTogether(problem, apart, curves, apart, contradictory)
-        if alone.apart_is_likelier:
-            return alone
-        return KindsTogether(joint, replace(together, other_kinds=curves), curves, apart, contradictory)
+def joined(problem: FittingProblem, kinds: Sequence[OtherKind], fitted: Sequence[Explanation] = ()) -> KindsTogether:
+    """The recordings of the `problem`, of which some sets may be `fitted` already, together with the curves of other
+    kinds or alone, whichever is more probable: both under the same noise."""
+    apart = search(problem, fitted)
+    if not kinds:
+        return KindsTogether(problem, apart)
+    curves = CurveLikelihood(kinds, apart.explanations)
+    best = [
+        frozenset(answer.explanation.names)
+        for answer in apart.answers[:_OF_THE_OTHERS]
+        if answer.explanation is not None
+    ]
+    joint = FittingProblem(problem.lines, problem.table, curves)
+    together = search(joint, required_sets=curves.required_sets(problem.lines, best))
+    log_apart = _log_apart(apart, curves) + np.log(_DIFFERENT_MATERIAL)
+    log_together = together.log_total + np.log1p(-_DIFFERENT_MATERIAL)
+    contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
+    alone = KindsTogether(problem, apart, curves, apart, contradictory)
+    if alone.apart_is_likelier:
+        return alone
+    return KindsTogether(joint, replace(together, other_kinds=curves), curves, apart, contradictory)
 
 
 def _log_apart(apart: Search, curves: CurveLikelihood) -> float:

@@ -203,7 +203,7 @@ def by_frfs(campaigns: Sequence[Campaign]) -> tuple[list[Campaign], list[Campaig
     """The campaigns with FRFs, and those with curves only."""
     parts: tuple[list[Campaign], list[Campaign]] = ([], [])
     for campaign in campaigns:
-        parts[not any(isinstance(recording, FrfRecording) for recording in campaign.recordings)].append(campaign)
+        parts[not campaign.of(FrfRecording)].append(campaign)
     return parts
 
 

@@ -13,15 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.inference.explanation import PRUNE_NATS, Explanation
-from underskin.diagnosis.inference.gaussian import Gaussian
-from underskin.diagnosis.inference.hypothesis import quadratic_of_prior
+from underskin.diagnosis.inference.explanation import PRUNE_NATS
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.facts import DiagnosisResult
 from underskin.diagnosis.reporting.report import report, reported
 from underskin.diagnosis.selection.priors import SHOWS, log_prior
 from underskin.diagnosis.several.campaigns import by_frfs, curves_once, refuse_copies, with_curves
-from underskin.diagnosis.several.histories import CampaignFits, Names, log_change, p_described
+from underskin.diagnosis.several.histories import CampaignFits, Names, SharedParameters, log_change, p_described
 from underskin.diagnosis.several.joint_report import Fleet, PooledQuantity, fleet_document
 from underskin.diagnosis.several.population import (
     DEPARTURES,
@@ -47,7 +45,6 @@ _LEAST_SKINS = 3  # of a population
 _P_DIFFERS = 0.03  # probability that a skin differs from the others by one mechanism
 # Of the logarithm of a strength: its spread from skin to skin; sd of its mean, and of a skin that departs in it
 _STRENGTH, _STRENGTH_SD, _DEPARTURE_SD = Spread(0.1, 2.0), 10.0, 1.0
-_INFORMS = 0.5  # of the precision of a strength's prior: the least of informative recordings
 
 
 def diagnose_fleet(
@@ -251,8 +248,11 @@ def strengths(candidates: Mapping[str, CampaignFits], sets: Sequence[Names]) -> 
         fit = candidate.fit(names)
         for mechanism, span in fit.spans.items():
             for index in range(span.start, span.stop):
-                parameter, likelihood = fit.model.parameters[index], _likelihood(fit, index)
-                if parameter.scale == "log" and likelihood is not None:
+                parameter = fit.model.parameters[index]
+                if parameter.scale != "log" or index not in fit.best.hypothesis.mean_indices:
+                    continue
+                likelihood = SharedParameters.at(fit, [index]).likelihood
+                if likelihood.precision.any():
                     regular = State(REGULAR, likelihood, np.zeros(1))
                     departing = State("strength", likelihood, np.array([_DEPARTURE_SD**2]))
                     name = f"{mechanism}.{parameter.name}", parameter.unit
@@ -271,15 +271,3 @@ def strengths(candidates: Mapping[str, CampaignFits], sets: Sequence[Names]) -> 
         for (name, unit), of_skins in states.items()
         if len(of_skins) >= _LEAST_SKINS
     ]
-
-
-def _likelihood(fit: Explanation, index: int) -> Gaussian | None:
-    """The likelihood of one fit coordinate by the recordings only, without the prior; None where they hardly inform, or
-    the coordinate changes the covariance only."""
-    if index not in fit.best.hypothesis.mean_indices:
-        return None
-    at, after = float(fit.point.fit[index]), 1 / float(fit.best.covariance_of([index])[0, 0])
-    prior, centre = quadratic_of_prior(fit.model.parameters[index], at)
-    if after - prior < _INFORMS * prior:
-        return None
-    return Gaussian(np.array([[after - prior]]), np.array([after * at - prior * centre]), 0.0)

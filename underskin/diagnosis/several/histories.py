@@ -42,53 +42,49 @@ Names = tuple[str, ...]
 
 @dataclass(frozen=True, eq=False)
 class SharedParameters:
-    """The posterior of some parameters of a fit, and their priors, in fit coordinates (parameters,)."""
+    """Some parameters of a fit, in fit coordinates (parameters,): the most probable values, the likelihood by the
+    recordings, and centre and precision of their priors."""
 
     parameters: tuple[Parameter, ...]
     mean: Floats
-    precision: Floats  # (parameters, parameters), at least the prior's in every direction: a quadratic may be flatter
-    prior_mean: Floats
-    prior_precision: Floats
+    likelihood: Gaussian
+    centre: Floats
+    precision: Floats
 
     @classmethod
     def of(cls, fit: Explanation, mechanisms: Sequence[str], others: Sequence[str] = ()) -> Self:
         """Of these mechanisms' parameters, and of `others` of the model by name."""
-        hypothesis, model = fit.best.hypothesis, fit.model.parameters
+        model = fit.model.parameters
         indices = [index for name in mechanisms for index in range(len(model))[fit.spans[name]]]
         indices += [index for name in others for index, parameter in enumerate(model) if parameter.name == name]
-        indices = [index for index in indices if index in hypothesis.mean_indices]
-        priors = [_normal_prior(model[index], float(fit.point.fit[index])) for index in indices]
-        prior_mean, prior_precision = np.array(priors).reshape(-1, 2).T
-        further = np.linalg.inv(fit.best.covariance_of(indices)) - np.diag(prior_precision)
-        added, vectors = np.linalg.eigh(further)
-        precision = np.diag(prior_precision) + (vectors * np.maximum(added, 0.0)) @ vectors.T
-        return cls(
-            tuple(model[index] for index in indices), fit.point.fit[indices], precision, prior_mean, prior_precision
-        )
+        return cls.at(fit, [index for index in indices if index in fit.best.hypothesis.mean_indices])
 
-    def likelihood(self, prior_precision: Floats) -> Gaussian:
-        """The likelihood that turns a normal prior of this precision into the posterior."""
-        linear = self.precision @ self.mean - prior_precision * self.prior_mean
-        return Gaussian(self.precision - np.diag(prior_precision), linear, 0.0)
+    @classmethod
+    def at(cls, fit: Explanation, indices: Sequence[int]) -> Self:
+        """Of the parameters at these indices, which change the mean."""
+        parameters, mean = tuple(fit.model.parameters[index] for index in indices), fit.point.fit[[*indices]]
+        priors = [_normal_prior(parameter, at) for parameter, at in zip(parameters, mean.tolist(), strict=True)]
+        centre, precision = np.array(priors).reshape(-1, 2).T
+        likelihood = Gaussian.from_posterior(0.0, mean, fit.best.covariance_of(indices), centre, precision)
+        return cls(parameters, mean, likelihood, centre, precision)
 
 
 def _normal_prior(parameter: Parameter, fit: float) -> tuple[float, float]:
-    """Mean and precision; those of the same variance where the prior is uniform."""
+    """Centre and precision; those of the same variance where the prior is uniform."""
     precision, centre = quadratic_of_prior(parameter, fit)
     low, high = parameter.bounds
     return (centre, precision) if precision else ((low + high) / 2, 12 / (high - low) ** 2)
 
 
-def _likelihoods(parts: Sequence[SharedParameters]) -> tuple[list[Gaussian], Floats, Floats]:
-    """The likelihoods by several fits, and the mean and precision of the prior that they share: the least precise one,
-    since in heavy tails the quadratics of one prior differ."""
-    precision = np.min([shared.prior_precision for shared in parts], axis=0)
-    return [shared.likelihood(precision) for shared in parts], parts[0].prior_mean, precision
+def _common_prior(parts: Sequence[SharedParameters]) -> tuple[Floats, Floats]:
+    """Centre and precision of the prior that several fits share: the least precise one, since in heavy tails the
+    quadratics of one prior differ."""
+    return parts[0].centre, np.min([shared.precision for shared in parts], axis=0)
 
 
 def log_agreement(earlier: SharedParameters, later: SharedParameters) -> float:
     """ln ∫ p₁(x) p₂(x)/p(x) dx: the log Bayes factor for equal parameters in two campaigns."""
-    (first, second), *prior = _likelihoods([earlier, later])
+    first, second, prior = earlier.likelihood, later.likelihood, _common_prior([earlier, later])
     joint, *separate = (likelihood.log_integral(*prior) for likelihood in (first + second, first, second))
     return float(joint - sum(separate))
 
@@ -280,8 +276,8 @@ def periods(fits: Sequence[CampaignFits], histories: Sequence[SetHistory]) -> li
 def _combined(parts: Sequence[SharedParameters]) -> tuple[Floats, Floats]:
     """Mean and standard deviations of parameters that several fits share: their precisions add, with the prior counted
     once."""
-    likelihoods, *prior = _likelihoods(parts)
-    mean, covariance = sum(likelihoods[1:], likelihoods[0]).posterior(*prior)
+    first, *others = (shared.likelihood for shared in parts)
+    mean, covariance = sum(others, first).posterior(*_common_prior(parts))
     low, high = np.array([parameter.bounds for parameter in parts[0].parameters]).reshape(-1, 2).T
     return np.clip(mean, low, high), np.sqrt(np.diag(covariance))
 

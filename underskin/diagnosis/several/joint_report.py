@@ -21,9 +21,9 @@ from underskin.diagnosis.data.names import (
     in_words,
     quantity_in_words,
 )
-from underskin.diagnosis.reporting.d33 import StatedD33
 from underskin.diagnosis.reporting.headline import WORDS, within_words
 from underskin.diagnosis.reporting.numbers import at_bound_in_words, rounded
+from underskin.diagnosis.reporting.quantities import StatedD33
 from underskin.diagnosis.reporting.report import ALTERNATIVES, EMPTY, LEAST_PROBABILITY, Reported
 from underskin.diagnosis.reporting.statement import slip_clauses
 from underskin.diagnosis.several.histories import AGEING, Names, Period, SetHistory

@@ -19,17 +19,15 @@ import numpy as np
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import cell_response
-from underskin.diagnosis.noise import NoiseLevels
+from underskin.diagnosis.inference.residuals import Reading
 from underskin.diagnosis.selection.answers import Search, remainder
 from underskin.diagnosis.selection.unlisted_search import law_of, nearest_law
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, in_plain_words
 from underskin.recordings.campaign import curves_of, frf_of
 from underskin.recordings.curve_course import is_one_sided
-from underskin.units import Floats, Indices, Mask
+from underskin.units import Mask
 
 _STRETCHES = 9  # of a curve
 _HIGH_FORCE = 0.6  # of a curve's highest force
@@ -170,61 +168,27 @@ def hold_out(
         fits = {fit.names: fit for fit in training.refit(candidates) if fit is not None}
         if null.names in fits:
             chosen = max(fits.values(), key=weight)
-            part = problem.lines.part(rows)
-            before, after = (_predict(training, fit, problem, rows, part) for fit in (fits[null.names], chosen))
+            before, after = (_predict(problem, fit, rows, ~rows) for fit in (fits[null.names], chosen))
             predictions.append(HeldOut(name, chosen.names, before, after))
     return predictions
 
 
 def _predict(
-    training: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask, held_out_lines: Lines
+    problem: FittingProblem, explanation: Explanation, rows: Mask, fitted: Mask | None = None
 ) -> PredictionScore:
-    """Of some of the rows, `held_out_lines`, from a fit to others; sensors in the training data keep their gain."""
-    model = problem.hypothesis(explanation.names, has_position_scatter=False, all_lines=True).model
-    point, levels = explanation.point, explanation.best.levels
-    if not isinstance(model, FrfModel):
-        return _predict_curves(problem.lines, levels, model.predict(point.fit).value.real, rows, training)
-    prediction = model.predict(point.fit, slopes=False, place=False)
-    trained = np.isin(held_out_lines.sensor, training.lines.sensor)
-    gains = np.zeros(max(int(held_out_lines.sensor.max()), int(training.lines.sensor.max())) + 1)
-    fitted_gains = explanation.best.sensor_gains
-    gains[: len(fitted_gains)] = fitted_gains
-    # A contact on an extremum of σ feels positioning scatter in second order, as in the likelihood
-    p2, curvature, recording = levels.position**2, problem.curvature, problem.lines.recording[rows]
-    value = prediction.value[rows] * np.exp(gains[held_out_lines.sensor])[held_out_lines.recording]
-    value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
-    scatter = levels.gain**2 + np.where(trained, 0.0, levels.spread**2)
-    noise = scatter[held_out_lines.recording] * np.abs(value) ** 2 + 2 * (levels.level * held_out_lines.deviation) ** 2
-    position_variance = p2 * (model.relative_place_slopes(point.fit) ** 2).sum(axis=0)
-    noise = noise + position_variance[recording] * np.abs(prediction.value[rows]) ** 2
-    noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
-    noise = noise + 2 * prediction.pickup_variance[rows]
-    square = np.abs(held_out_lines.value - value) ** 2
-    return _score(held_out_lines.first, square, noise, np.abs(value) ** 2)
-
-
-def _predict_curves(
-    lines: Lines, levels: NoiseLevels, force: Floats, rows: Mask, training: FittingProblem
-) -> PredictionScore:
-    """Of some of the rows, with the gain, the zero and the drift of the load cell by the fitted rows."""
-    fitted = ~rows if len(training.lines.value) < len(lines.value) else rows
-    cell = cell_response(lines, levels, force, fitted)
-    assert lines.smooth is not None
-    value = cell.reading(lines, force)
-    noise = cell.variance + (levels.level * lines.deviation) ** 2 + (levels.smooth * lines.smooth.scale) ** 2
-    recording = lines.recording[rows]
+    """Of some of the rows, from a fit to those that are `fitted`, by default all; sensors among these keep their gain,
+    and load cells their gain, zero and drift."""
+    lines, reading = problem.lines, Reading.of(problem, explanation, fitted)
+    measured, value, recording = lines.value[rows], reading.value[rows], lines.recording[rows]
+    noise = lines.parts * reading.variance[rows] + reading.relative[rows] * np.abs(value) ** 2
+    # Relative to a measured force: a law may predict none, and each explanation has its own zero of force.
+    columns = np.abs(measured - value) ** 2, noise, np.abs(measured if lines.curves else value) ** 2
     first = np.flatnonzero(np.diff(recording, prepend=-1))
-    # Relative to the measured force: a law may predict none, and each explanation has its own zero of force.
-    measured = lines.value.real[rows]
-    return _score(first, (measured - value[rows]) ** 2, noise[rows], measured**2)
-
-
-def _score(first: Indices, square: Floats, noise: Floats, size: Floats) -> PredictionScore:
-    """From squared errors, their expectation from noise and the squared size (rows,)."""
-    squares, noises, sizes = (np.add.reduceat(column, first) for column in (square, noise, size))
+    squares, noises, sizes = (np.add.reduceat(column, first) for column in columns)
     sizes = np.maximum(sizes, 1e-300)
-    score = -0.5 * (squares / noises + np.log(2 * np.pi * noises / sizes))
-    return PredictionScore(float(square.sum()), float(size.sum()), float(noise.sum()), float(score.sum()), len(first))
+    log_scores = -0.5 * (squares / noises + np.log(2 * np.pi * noises / sizes))
+    square, expected, size = (float(column.sum()) for column in columns)
+    return PredictionScore(square, size, expected, float(log_scores.sum()), len(first))
 
 
 def total(groups: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:
@@ -235,8 +199,7 @@ def total(groups: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore]:
 
 def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionScore:
     """Of the recordings that the explanation was fitted to."""
-    all_rows = np.ones(len(problem.lines.value), dtype=bool)
-    return _predict(problem, explanation, problem, all_rows, problem.lines)
+    return _predict(problem, explanation, np.ones(len(problem.lines.value), dtype=bool))
 
 
 def held_out(

@@ -17,9 +17,9 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.data.names import EXPLAINED, RIVAL_SHARE
@@ -35,9 +35,8 @@ from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Array, Floats
 
-Split = tuple[Floats, NDArray[np.float32] | None]
 _SHAPE_QUANTILES = (0.1, 0.9)  # of the prior of a shape parameter
-_BLOCK_NUMBERS = 1 << 16  # numbers of a signature per block
+_ROWS_AT_ONCE = 1 << 14
 
 
 class Signatures:
@@ -50,13 +49,12 @@ class Signatures:
     def __init__(self, problem: FittingProblem) -> None:
         """Predicted around the base model with the declared values."""
         self._problem = problem
-        self._fitter = Fitter(problem.hypothesis((), has_position_scatter=False))
-        point = self._fitter.initial(np.zeros((1, 0))).points.fit[0]
-        self._base = self._fitter.model.predict(point)
+        fitter = Fitter(problem.hypothesis((), has_position_scatter=False))
+        self._point = fitter.initial(np.zeros((1, 0))).points
+        self._hypothesis, base = fitter.hypothesis, fitter.model.predict(self._point.fit[0])
         self.mechanisms: list[str] = []
         self.percent: list[float] = []
-        self._values: list[tuple[Array, Lines]] = []
-        self._products_by_smooth: dict[float, tuple[Floats, Floats]] = {}
+        self._columns: list[tuple[Array, Lines]] = [(slope, fitter.lines) for slope in base.slopes]
         for name, mechanism in problem.lines.mechanisms.named.items():
             if problem.kind not in mechanism.kinds:
                 continue
@@ -67,17 +65,14 @@ class Signatures:
                 hypothesis = problem.hypothesis((name,), has_position_scatter=False)
             except Unsupported:
                 continue
-            shapes = np.array([[*shape, *point] for shape in _shapes(parameters)])
+            shapes = np.array([[*shape, *self._point.fit[0]] for shape in _shapes(parameters)])
             model = hypothesis.model
             for value in model.values(shapes) if isinstance(model, FrfModel) else model.forces(shapes):
+                before = base.value if len(value) == len(base.value) else base.value[hypothesis.lines.recording]
+                size = (np.abs(value - before) ** 2).sum() / (np.abs(before) ** 2).sum()
                 self.mechanisms.append(name)
-                self.percent.append(self._size(value, hypothesis.lines))
-                self._values.append((value, hypothesis.lines))
-
-    def _size(self, value: Array, lines: Lines) -> float:
-        """The relative change on the rows of these lines: 100 · √(Σ|change|² / Σ|base|²)."""
-        base = self._base.value if len(value) == len(self._base.value) else self._base.value[lines.recording]
-        return 100 * float(np.sqrt((np.abs(value - base) ** 2).sum() / (np.abs(base) ** 2).sum()))
+                self.percent.append(100 * float(np.sqrt(size)))
+                self._columns.append((value - before, hypothesis.lines))
 
     @property
     def typical(self) -> dict[str, int]:
@@ -87,84 +82,45 @@ class Signatures:
     def linearised(self, levels: NoiseLevels) -> Linearised:
         """The signatures as changes of the base model's prediction under this noise, its parameters being the
         nuisances."""
-        return Linearised(self._information(levels), self._fitter.hypothesis.priors[0])
-
-    def d33_shifts(self, linearised: Linearised) -> Floats:
-        """The error of ln d33 by each (signatures,), of FRFs."""
-        return linearised.absorbed()[self._fitter.hypothesis.index("d33")]
-
-    def _products(self, smooth: float) -> tuple[Floats, Floats]:
-        """Re u*J and Re JᵀJ of the nuisances and the signatures; of curves with a smooth error of that share."""
-        if smooth not in self._products_by_smooth:
-            rows = _Rows(self._problem, self._base.value, smooth)
-            slopes = [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
-            changes = [rows.split_change(*signature) for signature in self._values]
-            self._products_by_smooth[smooth] = rows.products([*slopes, *changes])
-        return self._products_by_smooth[smooth]
-
-    def _information(self, levels: NoiseLevels) -> Floats:
-        """On the nuisances and then on all signatures."""
-        hypothesis = self._problem.hypothesis((), has_position_scatter=levels.position > 0)
-        fitter = Fitter(hypothesis)
-        base = fitter.initial(np.zeros((1, 0)))
+        fitter = Fitter(self._problem.hypothesis((), has_position_scatter=levels.position > 0))
+        products = fitter.products(self._point, slopes=False, place=fitter.has_position_scatter)
         gain, level, position, spread, smooth = (
             np.full((1, 1, 1), value)
             for value in (levels.gain, levels.level, levels.position, levels.spread, levels.smooth)
         )
         several = SeveralLevels(gain, level, position, spread, None, smooth)
-        along, square = self._products(levels.smooth if fitter.lines.curves else 0.0)
-        return fitter.tangent(base.points, base.products, several).information(along, square)[0]
+        tangent = fitter.tangent(self._point, products, several)
+        if self._problem.lines.curves:
+            information = tangent.information_on_forces(np.array([column.real for column, _ in self._columns]))
+        else:
+            information = tangent.information(*self._line_products)[0]
+        return Linearised(information, self._hypothesis.priors[0])
 
+    def d33_shifts(self, linearised: Linearised) -> Floats:
+        """The error of ln d33 by each (signatures,), of FRFs."""
+        return linearised.absorbed()[self._hypothesis.index("d33")]
 
-class _Rows:
-    """Rows split into the component along the base model's response in each recording and the rest, across it."""
-
-    def __init__(self, problem: FittingProblem, base: Array, smooth: float) -> None:
-        """From the base model's prediction of the collapsed lines, or of curves with a smooth error `smooth`."""
-        self._lines = problem.lines
-        whitening = problem.lines.whitening
-        self._root = 1.0 if whitening is None else np.sqrt(whitening.weight(np.array([smooth])))
-        self._direction = self._whitened(base.real if problem.lines.curves else np.ones(len(problem.lines.value)))
-        self._size = np.sqrt(self._sums(self._direction**2))
-        self.base, _ = self.split(base, problem.collapsed)
-
-    def split(self, value: Array, lines: Lines) -> Split:
-        """A prediction of these lines along the response (recordings,) and across it (numbers,), None where that is 0.
-
-        The part across is in single precision, since each signature has one on all lines.
-        """
-        if lines is not self._lines:
-            return value.real * self._size, None
-        whitened = self._whitened(value.real)
-        along = self._sums(self._direction * whitened) / self._size
-        across = whitened - self._direction * (along / self._size)[lines.recording]
-        stacked = across if lines.curves else np.concatenate([across, self._whitened(value.imag)])
-        return along, stacked.astype(np.float32)
-
-    def split_change(self, value: Array, lines: Lines) -> Split:
-        """The same of the difference of a prediction from the base model's."""
-        along, across = self.split(value, lines)
-        return along - self.base, across
-
-    def products(self, parts: Sequence[Split]) -> tuple[Floats, Floats]:
-        """Re u*J (1, P, recordings) and Re JᵀJ (1, P, P) of split columns J."""
-        along = np.array([part for part, _ in parts])
-        square = along @ along.T
-        with_across = [index for index, (_, component) in enumerate(parts) if component is not None]
-        if with_across:
-            across = [component for _, component in parts if component is not None]
-            for first in range(0, len(across[0]), _BLOCK_NUMBERS):
-                block = np.array([component[first : first + _BLOCK_NUMBERS] for component in across], dtype=float)
-                square[np.ix_(with_across, with_across)] += block @ block.T
-        return (along * self._size)[None], square[None]
-
-    def _whitened(self, rows: Floats) -> Floats:
-        """Real rows scaled so that their errors are independent with variance 1."""
-        whitening = self._lines.whitening
-        return rows / self._lines.deviation if whitening is None else whitening.turned(rows) * self._root
-
-    def _sums(self, rows: Floats) -> Floats:
-        return np.add.reduceat(rows, self._lines.first)
+    @cached_property
+    def _line_products(self) -> tuple[Floats, Floats]:
+        """Re u*J (1, P, recordings) and Re JᵀJ (1, P, P) of the nuisances and the signatures of FRFs, with u = 1: of
+        their means over recordings, and of what the lines of some differ from these."""
+        lines = self._problem.lines
+        weight = lines.deviation**-2
+        total = np.add.reduceat(weight, lines.first)
+        means = np.array(
+            [
+                np.add.reduceat(weight * column.real, lines.first) / total if rows is lines else column.real
+                for column, rows in self._columns
+            ]
+        )
+        square = (means * total) @ means.T
+        on_lines = [index for index, (_, rows) in enumerate(self._columns) if rows is lines]
+        for first in range(0, len(weight) if on_lines else 0, _ROWS_AT_ONCE):
+            rows = slice(first, first + _ROWS_AT_ONCE)
+            columns = np.array([self._columns[index][0][rows] for index in on_lines])
+            about = (columns - means[on_lines][:, lines.recording[rows]]) * np.sqrt(weight[rows])
+            square[np.ix_(on_lines, on_lines)] += (about @ about.conj().T).real
+        return (means * total)[None], square[None]
 
 
 def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:

@@ -1,7 +1,8 @@
-"""d33 of a report: over all answers, whether it is to be quoted, and what would change it without showing.
+"""d33 and Young's modulus of a report, over all answers: whether d33 is to be quoted, and what would change it unseen.
 
-d33 is averaged over the level at which the factor of an unlisted law is 1 (`numbers.law_levels`): a resonance may leave
-the low frequencies as they are, or the high ones, and d33 differs by what the law does in between.
+Both are averaged over the level at which the factor of an unlisted law is 1 (`numbers.law_levels`): a resonance may
+leave the low frequencies as they are, or the high ones, and d33 differs by what the law does in between. E is
+integrated over the scatter of gains, the idealisation of laws, and what an apparent modulus may hide as well.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.names import MOST_QUOTED, in_words
-from underskin.diagnosis.inference.evidence import marginalise_sensor_spread
+from underskin.diagnosis.inference.evidence import marginalise_curve_noise, marginalise_sensor_spread
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.residuals import declared_d33, with_hidden_mechanism
@@ -21,8 +22,10 @@ from underskin.diagnosis.reporting.numbers import (
     law_levels,
     of_logarithms,
     over_answers,
+    scaled,
 )
 from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.other_kinds import MODULUS_ERROR, hidden_factors, may_hide
 from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, even_laws
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Likeness
 from underskin.findings.formatting import in_digits, listed
@@ -202,3 +205,55 @@ _CONFOUNDED: Mapping[Likeness, str] = {
 
 def _percent(hidden: HiddenShift) -> str:
     return f"{in_digits(abs(hidden.percent), 2)} %"
+
+
+_MOST = 0.5  # of the variance of log E: the part that another parameter explains
+_LAW_FACTORS = ("gain", "modulus")  # what an unlisted law acts on as a factor on the force
+
+
+def modulus_under(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
+    """The report's E of curves under one explanation."""
+    return _entry(problem, explanation, _log_modulus(problem, explanation))
+
+
+def modulus_over_answers(search: Search, problem: FittingProblem, shown: Explanation) -> dict[str, Any] | None:
+    """The report's E of curves over all answers; `shown`, the fit behind the leading one, tells whether E is at a bound
+    of its search. None where answers without a fit are more probable than all others: nothing describes the curves."""
+    parts = over_answers(search, lambda explanation, _: _log_modulus(problem, explanation))
+    return _entry(problem, shown, NormalMixture.joined([part for _, part in parts])) if parts else None
+
+
+def _log_modulus(problem: FittingProblem, explanation: Explanation) -> NormalMixture:
+    """The logarithm of E [MPa]; the shares sum to 1."""
+    spans, index = explanation.spans, explanation.index("youngs_modulus")
+    factor = [spans[MODULUS_ERROR].start] if MODULUS_ERROR in spans else []
+    mixture = marginalise_curve_noise(explanation.best, [index, *factor])
+    mixture = mixture.averaged_over(law_levels(problem, explanation, _LAW_FACTORS))
+    hiding = may_hide(problem.lines.campaign, problem.lines.mechanisms.named)
+    hidden = hidden_factors(hiding, explanation.names)
+    return NormalMixture.joined([mixture.moved(-excess).times(share) for excess, share in hidden])
+
+
+def _search_ended(explanation: Explanation, index: int) -> str | None:
+    """The end of a search that E shares: its own, or that of a parameter which most of its uncertainty follows, as the
+    modulus before a relaxation that is faster than the recording."""
+    parameters, fit = explanation.model.parameters, explanation.point.fit
+    means = explanation.best.hypothesis.mean_indices
+    for span in [slice(index, index + 1), *explanation.spans.values()]:
+        for other in range(span.start, span.stop):
+            side = parameters[other].ends_search(float(fit[other]))
+            if side is None or other not in means:
+                continue
+            variance = explanation.best.covariance_of([index, other])
+            if variance[0, 1] ** 2 > _MOST * variance[0, 0] * variance[1, 1]:
+                return side if variance[0, 1] > 0 else {"low": "high", "high": "low"}[side]
+    return None
+
+
+def _entry(problem: FittingProblem, explanation: Explanation, mixture: NormalMixture) -> dict[str, Any]:
+    index = explanation.index("youngs_modulus")
+    at_bound = _search_ended(explanation, index)
+    declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is a factor on it
+    stated = of_logarithms(mixture.share / mixture.share.sum(), mixture.mean, mixture.deviation)
+    bound = {} if at_bound is None else {"at_bound": at_bound}
+    return {"name": "youngs_modulus", "unit": "MPa", **scaled(stated, declared), **bound}
