@@ -531,6 +531,40 @@ def test_gain_changes_within_series(table: SigmaTable, factor: float) -> None:
         assert FindingCode.GAIN_STEPS not in [finding.code for finding in steady.findings]
 
 
+@pytest.mark.parametrize("alternates", [False, True])
+def test_lines_at_two_levels(table: SigmaTable, *, alternates: bool) -> None:
+    """A gain that steps between two frequencies, or alternates, leaves out a recording of several, and the array
+    without d33 where it is that of all; filters and resonances are no such steps."""
+    lines = np.geomspace(5, 120, 40)
+    rig = Rig(np.full(2, 14.0), frequency_hz=lines, preloads_n=(0.5, 1.0, 2.0), indenters_mm=(4.0,), line=0.005)
+    campaign = simulate(table, rig, np.random.default_rng(3))
+    step = np.where(np.arange(40) % 2 == 0 if alternates else lines > 25, 0.5, 1.0)
+    low_pass, peak = 1 / np.sqrt(1 + (lines / 40) ** 8), 1 / np.abs(1 - (lines / 60) ** 2 + 0.1j)
+
+    def found(by: Floats, count: int) -> tuple[Inversion, list[Finding]]:
+        changed = campaign
+        for row in range(count):
+            changed = scaled(changed, row, by)
+        inversion = invert(changed, table)
+        every = [*inversion.left_out, *inversion.findings]
+        return inversion, [
+            one for one in every if isinstance(one, Finding) and one.reason is Reason.GAIN_OVER_FREQUENCY
+        ]
+
+    single, (left_out,) = found(step, 1)
+    assert left_out.recording == campaign.recordings[0].id
+    assert single.campaign_d33 is not None
+    assert covered(single.campaign_d33, np.array(14.0))
+    every, (finding,) = found(step, len(campaign.recordings))
+    assert every.campaign_d33 is None
+    assert finding.arguments["factor"] == pytest.approx(2.0, rel=0.02)
+    assert finding.arguments["is_step"] != alternates
+    if not alternates:
+        assert finding.arguments["low_hz"] < 25 < finding.arguments["high_hz"] < 28
+    for smooth in (np.ones(40), low_pass, peak):
+        assert found(smooth, len(campaign.recordings))[1] == []
+
+
 @pytest.mark.parametrize("share", first(2, [0.0, 0.03, 0.003, 0.1]))
 def test_an_array_read_whole_under_each_contact(share: float, table: SigmaTable) -> None:
     """Sensors that feel next to nothing of a contact read cross-talk, which is no d33: they are not used."""

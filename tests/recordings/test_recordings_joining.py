@@ -173,3 +173,26 @@ def test_wells_of_two_runs_of_a_real_instrument() -> None:
     assert len(set(wells)) == len(files) / 2
     assert not found.problems
     assert not any("very numbers" in warning for warning in found.warnings)
+
+
+def test_single_sensors_without_places() -> None:
+    """A campaign of one sensor needs no place of it; such files together are of sensors far from each other, each
+    pressed where its own file says."""
+    files = []
+    for sensor, offset in (("s1", None), ("s2", 0.5)):
+        one = to_dict(reading(press("r", sensor)).campaign)
+        del one["skin"]["sensors"]
+        one["recordings"][0] |= {} if offset is None else {"position_mm": [offset, 0.0]}
+        files.append((f"{sensor}.json", Reading(parse(one), [], [])))
+    found = join("palm", files)
+    places = {sensor.id: sensor.x_mm for sensor in found.campaign.skin.sensors}
+    assert places["s2"] - places["s1"] > 10 * 2.5
+    assert [one.position_mm for one in found.campaign.of(FrfRecording)] == [None, (places["s2"] + 0.5, 0.0)]
+    assert "s1 and s2 lies at x 0 mm, y 0 mm in its file" in found.warnings[0]
+
+
+def test_places_of_several_sensors_are_needed() -> None:
+    document = to_dict(reading(press("a", "s1"), press("b", "s2")).campaign)
+    document["skin"]["sensors"] = [{"id": "s1", "x_mm": 0.0, "y_mm": 0.0}, {"id": "s2"}]
+    with pytest.raises(InvalidInput, match=r"skin.sensors\[1\].x_mm.*required, but of a skin's only sensor"):
+        parse(document)

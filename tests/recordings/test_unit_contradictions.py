@@ -125,11 +125,31 @@ def test_words_and_abbreviations_are_units(label: str, newtons: float) -> None:
     ],
 )  # fmt: skip
 def test_synonyms_are_one_unit(one: str, other: str) -> None:
-    if other != "lbf/in2":
-        assert unit(other) is not None
-        assert meanings(one) == (unit(other),)
-    else:
-        assert unit(one) is not None
+    assert unit(other) is not None
+    assert meanings(one) == (unit(other),)
+
+
+@pytest.mark.parametrize(
+    ("label", "dimension", "size"),
+    [
+        ("fC", "charge", 1e-15), ("aC", "charge", 1e-18), ("femtocoulomb", "charge", 1e-15), ("fN", "force", 1e-15),
+        ("fA", "current", 1e-15), ("fC/N", "charge/force", 1e-15), ("aC/mN", "charge/force", 1e-15),
+        ("pC.N-1", "charge/force", 1e-12), ("cN", "force", 1e-2), ("daN", "force", 10.0), ("hPa", "pressure", 100.0),
+        ("kgf/cm2", "pressure", 98066.5), ("mN/mm²", "pressure", 1e3), ("lbf/in2", "pressure", 6894.757293),
+        ("dyn", "force", 1e-5), ("THz", "frequency", 1e12), ("rad/s", "frequency", 0.5 / np.pi),
+        ("rad·s^-1", "frequency", 0.5 / np.pi), ("krad/s", "frequency", 500 / np.pi), ("deg/s", "frequency", 1 / 360),
+        ("rev/min", "frequency", 1 / 60), ("cycles/s", "frequency", 1.0), ("cps", "frequency", 1.0),
+    ],
+)  # fmt: skip
+def test_conversions_to_si(label: str, dimension: str, size: float) -> None:
+    (meaning,) = meanings(label)
+    assert meaning.dimension == dimension
+    assert meaning.to_si == pytest.approx(size, rel=1e-9)
+
+
+@pytest.mark.parametrize("word", ["fs", "as", "am", "hs", "1/s"])
+def test_words_of_headings_are_no_rare_units(word: str) -> None:
+    assert meanings(word) == ()
 
 
 @pytest.mark.parametrize("heading", ["F_m", "Q_A", "F_s", "Force CH1, A", "Load cycles", "Force (g)"])

@@ -167,6 +167,7 @@ class Reason(StrEnum):
     TWO_GROUPS = "gain_steps.sensors"
     GAIN_STEP = "gain_steps.within"
     GAIN_DRIFTS = "gain_steps.drift"
+    GAIN_OVER_FREQUENCY = "gain_steps.over_frequency"
     WARM_UP = "warm_up"
     CHANNELS_SWAPPED = "channels_swapped"
     PRELOAD_AND_RADIUS_EXCHANGED = "channels_swapped.preload_and_radius"

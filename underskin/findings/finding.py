@@ -293,6 +293,11 @@ ENGLISH: Mapping[Reason, Words] = {
     f"{_CHANGES}",
     Reason.GAIN_DRIFTS: "the charge per force changes within the recording, from {lowest:.2f} to {highest:.2f} times "
     f"its mean{_CHANGES}",
+    Reason.GAIN_OVER_FREQUENCY: "{is_step:between|from} {low_hz:.4g} {is_step:and|to} {high_hz:.4g} Hz the charge per "
+    "force {is_step:{rises:rises|falls} by a factor of {factor:.3g}, and is level on either side|has two levels, a "
+    "factor of {factor:.3g} apart}: another range of the amplifier, a loose plug, or a resonance narrower than the "
+    "lines are apart{left_out:; left out|, and which level is right shows in no recording: no d33 is to be quoted}"
+    "{more:more recording}",
     Reason.WARM_UP: "the response drifts by {percent:+z.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "

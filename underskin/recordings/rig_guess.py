@@ -135,7 +135,7 @@ def _is_measured(source: Any, blocks: Sequence[Block]) -> bool:
 
 
 def _sensors(contents: Contents, document: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The sensors that the file names, whose positions are missing."""
+    """The sensors that the file names; of several, without columns of them, the positions are missing."""
     names = [one["sensor"] for one in document.get("recordings", [])]
     named = document["recording"].get("sensor", {})
     names += [str(contents.properties[named["property"]])] if "property" in named else []
@@ -145,10 +145,9 @@ def _sensors(contents: Contents, document: Mapping[str, Any]) -> list[dict[str, 
         names += list(words.texts) if words is not None else []
         names += [f"{number:g}" for number in np.unique(channel.values.real)] if words is None and channel else []
     places = _places(contents, column) if column else {}
-    return [
-        {"id": name, **dict(zip(("x_mm", "y_mm"), places.get(name, (None, None)), strict=True))}
-        for name in dict.fromkeys(filter(None, names))
-    ]
+    distinct = list(dict.fromkeys(filter(None, names)))
+    unknown = (None, None) if len(distinct) > 1 else (0, 0)
+    return [{"id": name, **dict(zip(("x_mm", "y_mm"), places.get(name, unknown), strict=True))} for name in distinct]
 
 
 def _places(contents: Contents, sensor: str) -> dict[str, tuple[float, float]]:

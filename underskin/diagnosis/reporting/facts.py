@@ -353,6 +353,10 @@ class Facts:
             "a law that is in no list acts on it": law is not None and not law.is_outside_band,
             "its force acts at the mains alone": self._holds_for_all(Reason.EXCITED_AT_MAINS),
             "its gain changes within the recordings": self._holds_for_all(Reason.GAIN_STEP, Reason.GAIN_DRIFTS),
+            "its gain changes over frequency": any(
+                finding.reason is Reason.GAIN_OVER_FREQUENCY and not finding.arguments["left_out"]
+                for finding in diagnosis.findings
+            ),
             self._by_other_sensors: bool(self._by_other_sensors),
             "no PVDF has such a value": plausibility.implausibility(
                 d33["value"], units_checked=self.problem.lines.campaign.units_checked
