@@ -225,7 +225,7 @@ def _complete(
     partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
     determining = frozenset() if partial.joined is None else partial.joined.determining_modulus(stated.names)
     if leader.explanation is not None:
-        partial = partial.with_findings(*curve_spread_findings(problem, stated))
+        partial = partial.with_findings(*curve_spread_findings(problem, stated, null))
     return replace(
         partial.with_findings(*above_noise(problem, stated, groups)),
         search=result,

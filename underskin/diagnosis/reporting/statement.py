@@ -30,7 +30,7 @@ from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.selection.other_kinds import may_hide
 from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
 from underskin.diagnosis.validation.signatures import Power
-from underskin.findings.codes import FindingCode, Lack, Lacking
+from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
 from underskin.findings.finding import lacking
 from underskin.findings.formatting import clause, in_digits, in_percent, of_clauses, small
 from underskin.inversion.mixed_model import SDS_OF_95
@@ -91,6 +91,7 @@ def statement(facts: Facts) -> str:
             mechanisms=facts.mechanisms,
             idle=facts.idle,
             doubts=doubts,
+            base_may_hold=any(finding.reason is Reason.SPECIMENS_DIFFER for finding in facts.diagnosis.findings),
             all_used=not slips,
             all_tried=not of_tried,
         )
@@ -137,12 +138,14 @@ def answer_clauses(
     *,
     all_used: bool = True,
     all_tried: bool = True,
+    base_may_hold: bool = False,
 ) -> list[str]:
     """The verdict as a clause, and further clauses on its meaning.
 
     `presence` and `mechanisms` are the report's, `idle` the mechanisms that may as well have no effect, `doubts` what
     else speaks against the set, such as a parameter at the bound of its search; `all_used` says that no recording was
-    left out or corrected, `all_tried` that no mechanism that might explain what is left was not tried.
+    left out or corrected, `all_tried` that no mechanism that might explain what is left was not tried; `base_may_hold`
+    that the doubts are in favour of the base model.
     """
     leader = answers[0]
     percent = in_percent(leader.probability)
@@ -183,7 +186,7 @@ def answer_clauses(
     but = but or [f"many rivals remain, each below {in_percent(NAMED)}"]
     shared = [group for group in certain if group["probability"] > leader.probability + NAMED]
     common = " and ".join(map(_group_in_words, shared))
-    doubtful = bool(idle or doubts) and leader.names != (NOTHING_MISSING,)
+    doubtful = bool(idle or doubts) and leader.names != (NOTHING_MISSING,) and not base_may_hold
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
     lead = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
