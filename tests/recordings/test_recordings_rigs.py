@@ -86,7 +86,7 @@ def test_force_falls_depth_needs_sign_said() -> None:
     ("part", "changes", "message"),
     [
         ((), {"schema": "rig/2"}, "schema = 'rig/2': must be rig/1"),
-        ((), {"kind": "tension"}, "kind = 'tension': must be one of frf, indentation, compression"),
+        ((), {"kind": "torsion"}, "kind = 'torsion': must be one of frf, indentation, compression, tension"),
         ((), {"rig": 3}, "rig = 3: unknown field"),
         (("skin",), {"colour": 0.5}, r"skin\.colour = 0\.5: must be one of"),
         (("recording",), {"preload_n": 2.5}, r"recording\.preload_n = 2\.5: must be one of"),

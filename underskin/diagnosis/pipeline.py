@@ -214,7 +214,7 @@ def _complete(partial: DiagnosisResult, together: KindsTogether, run: _Run) -> D
     partial = partial.with_findings(*_scatter_findings(problem, stated))
     partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
     if leader.explanation is not None:
-        partial = partial.with_findings(*curve_spread_findings(problem, stated))
+        partial = partial.with_findings(*curve_spread_findings(problem, stated, null))
     return replace(
         partial.with_findings(*above_noise(problem, stated, groups)),
         search=result,

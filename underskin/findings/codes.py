@@ -209,6 +209,7 @@ class Reason(StrEnum):
     SCATTER_AT_LIMIT = "unusual_scatter.at_limit"
     CURVE_STANDS_OFF = "unusual_scatter.curve"
     CURVES_DIFFER = "curves_differ"
+    SPECIMENS_DIFFER = "curves_differ.specimens"
     LOAD_NOT_LINEAR = "not_linear.load"
     PRESSURE_NOT_LINEAR = "not_linear.pressure"
     CONTACT_SLIPS = "contact_slips"

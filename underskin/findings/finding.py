@@ -34,6 +34,7 @@ from underskin.findings.sentences import (
     parameter_at_bound,
     sensor_alone,
     sensor_behind_filter,
+    specimens_differ,
     thickness_differs,
     thickness_unknown,
 )
@@ -371,6 +372,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.SCATTER_AT_LIMIT: "the gain of the recordings scatters by {percent:.2g} % or more, the most that is "
     "considered: something other than d33 decides what they read, and the array has no d33 to quote",
     Reason.CURVES_DIFFER: curves_differ,
+    Reason.SPECIMENS_DIFFER: specimens_differ,
     Reason.CURVE_STANDS_OFF: "its modulus is {factor:.2f} times that of the others, which differ by {others:.2g} % "
     "(sd): the gain of a rig scatters so once in {once:.0f}{radius_mm:, and a sphere of {radius_mm:.3g} mm would "
     "agree|}; look at what is declared of it, and repeat it",
