@@ -13,7 +13,7 @@ Files from outside may not hold links out of the file, cycles, or datasets that 
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -89,7 +89,7 @@ def _refuse_dataset(item: Any, here: str, file: str) -> None:
         raise FileError(file, here, f"declares {item.nbytes} bytes of data, of which the file stores {stored}")
 
 
-_TOLERANCES = "tolerances"
+_TOLERANCES, _OF_SENSOR = "tolerances", ("id", "x_mm", "y_mm")
 MAGIC = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("unit", "units", "Unit", "Units")
 _OURS = ("campaign/", "skin-export/")
@@ -109,7 +109,7 @@ def write_document(about: Mapping[str, Any], recordings: Iterable[Mapping[str, A
         sensors = skin.pop("sensors", [])
         skin |= {f"{_TOLERANCES}.{name}": value for name, value in (skin.pop(_TOLERANCES, None) or {}).items()}
         _write_attributes(target.create_group("skin"), skin)
-        for name in ("id", "x_mm", "y_mm") if sensors else ():
+        for name in _OF_SENSOR if sensors else ():
             target[f"skin/sensors/{name}"] = [sensor[name] for sensor in sensors]
         groups = target.create_group("recordings")
         for index, recording in enumerate(recordings):
@@ -158,17 +158,14 @@ def _variables(group: Any) -> dict[str, Any]:
 
 def _single(item: Any) -> dict[str, str | float]:
     """The attributes that are a number or a text."""
-    plain = {name: value for name in item.attrs if (value := _attribute(item, name)) is not None}
-    return {name: value for name, value in plain.items() if isinstance(value, str | int | float)}
-
-
-def _attribute(item: Any, name: str) -> Any:
-    """An attribute; None where h5py has no type for it."""
-    try:
-        value = np.asarray(item.attrs[name]).squeeze()
-    except (TypeError, ValueError, OSError):
-        return None
-    return _plain(value.item()) if value.ndim == 0 and value.dtype.kind in "iufSUO" else None
+    single: dict[str, str | float] = {}
+    for name in item.attrs:
+        with suppress(TypeError, ValueError, OSError):  # h5py has no type for it
+            stored = np.asarray(item.attrs[name]).squeeze()
+            value = _plain(stored.item()) if stored.ndim == 0 and stored.dtype.kind in "iufSUO" else None
+            if isinstance(value, str | int | float):
+                single[name] = value
+    return single
 
 
 def _document(source: Any, file: str) -> dict[str, Any]:
@@ -186,22 +183,17 @@ def _document(source: Any, file: str) -> dict[str, Any]:
     if tolerances:
         skin[_TOLERANCES] = {name.removeprefix(f"{_TOLERANCES}."): value for name, value in tolerances.items()}
     if "sensors" in source["skin"]:
-        columns = [_entries(source["skin/sensors"], name) for name in ("id", "x_mm", "y_mm")]
-        skin["sensors"] = [dict(zip(("id", "x_mm", "y_mm"), row, strict=True)) for row in zip(*columns, strict=True)]
+        stored = source["skin/sensors"]
+        columns = stored["id"].asstr()[()].tolist(), stored["x_mm"][()].tolist(), stored["y_mm"][()].tolist()
+        skin["sensors"] = [dict(zip(_OF_SENSOR, row, strict=True)) for row in zip(*columns, strict=True)]
     return {
         **about,
         "skin": skin,
-        "recordings": [_recording(source["recordings"][name]) for name in source["recordings"]],
+        "recordings": [
+            {**_attributes(group), **{name: group[name][()] for name in group}}
+            for group in source["recordings"].values()
+        ],
     }
-
-
-def _recording(group: Any) -> dict[str, Any]:
-    return {**_attributes(group), **{name: group[name][()] for name in group}}
-
-
-def _entries(group: Any, name: str) -> list[Any]:
-    dataset = group[name]
-    return list(dataset.asstr()[()]) if name == "id" else dataset[()].tolist()
 
 
 def _attributes(group: Any) -> dict[str, Any]:
