@@ -22,7 +22,7 @@ from underskin.diagnosis.slips.silent import silent
 from underskin.diagnosis.slips.table import Screened, Slip, without_slips
 from underskin.diagnosis.slips.table_domain import within_tables
 from underskin.diagnosis.slips.warm_up import warm_ups
-from underskin.diagnosis.slips.wrong_forces import are_many, contradicting_forces, together, wrong_forces
+from underskin.diagnosis.slips.wrong_forces import without_wrong_forces
 from underskin.diagnosis.slips.wrong_positions import all_positions, at_sensors, wrong_positions
 from underskin.diagnosis.slips.wrong_units import (
     contradicting,
@@ -45,9 +45,8 @@ LEAST_RECORDINGS = 2  # to compare one with another
 _FIELD = "frf_re_pc_per_n"
 _SAME = 1e-4  # relative difference of copies: files round numbers to some digits
 
-# The table of slips, in the order in which recordings can be judged: forces and declared values, then phases and
-# labels, for which no response has to be right, then responses beside the base model.
-OF_SERIES: Sequence[Slip] = (wrong_forces,)
+# The table of slips, in the order in which recordings can be judged: declared values, then phases and labels, for which
+# no response has to be right, then responses beside the base model.
 OF_VALUES: Sequence[Slip] = (wrong_values, wrong_positions)
 OF_LABELS: Sequence[Slip] = (conjugated, exchanged_labels)
 OF_RESPONSES: Sequence[Slip] = (
@@ -70,13 +69,9 @@ def inspect(campaign: Campaign, table: SigmaTable, keep_ids: Collection[str] | N
     plausible modulus brings them within.
     """
     given = list(frf_recordings(campaign)) if campaign.recordings else []
-    contradictions = contradicting_forces(given)
-    of_forces = together(contradictions, len(given))
-    if are_many(contradictions, given) and not campaign.units_checked:
+    recorded, of_forces, are_many = without_wrong_forces(given, units_checked=campaign.units_checked)
+    if are_many:
         return _inspected(campaign, [], of_forces, _impossible(of_forces, confirmable=True))
-    recorded = given
-    if contradictions and not campaign.units_checked:
-        recorded, of_forces = without_slips(Screened(campaign, given, table), OF_SERIES)
     series = as_lines(recorded)
     imported = frozenset(recording.id for recording in recorded if recording.sample_rate_hz is None)
     inspected = _inspect_lines(campaign, series.recordings, imported, table, keep_ids)

@@ -13,7 +13,7 @@ import scipy.io
 
 from underskin.errors import FileError, damage_said
 from underskin.recordings.channels import Contents
-from underskin.recordings.readers import hdf5_file, variables
+from underskin.recordings.readers import hdf5_guard, variables
 
 MAGIC_73 = b"MATLAB 7.3 MAT-file"
 _EXPORTS = {"timetable": "writetimetable({0}, '{0}.csv')", "table": "writetable({0}, '{0}.csv')"}
@@ -29,7 +29,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
         # SciPy's stubs accept paths only
         if is_73:
             with h5py.File(stream, "r") as source:
-                hdf5_file.refuse_outside(source, file)
+                hdf5_guard.refuse_outside(source, file)
                 stored = _structure_73(source)
         else:
             stored = scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]

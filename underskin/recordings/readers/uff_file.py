@@ -21,7 +21,6 @@ _FUNCTION = 58
 _FRF, _COHERENCE = 4, 6  # function types
 _FREEDOM = ("rsp_node", "rsp_dir", "ref_node", "ref_dir")
 _TIME, _FREQUENCY = 17, 18  # specific data types of the abscissa
-_END = b"-1"
 
 
 def read(stream: BinaryIO, file: str) -> Contents:
@@ -35,9 +34,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
         raise FileError(file, "", f"holds no whole dataset {_FUNCTION}; its datasets: {types or 'none'}")
     if len(functions) < len(types):
         notes.append(f"datasets other than {_FUNCTION} are left out: {sorted(set(types) - {_FUNCTION})}")
-    frfs = [
-        function for function in functions if int(function["func_type"]) == _FRF and np.iscomplexobj(function["data"])
-    ]
+    frfs = [one for one in functions if int(one["func_type"]) == _FRF and np.iscomplexobj(one["data"])]
     if len(frfs) < 2:
         return Contents(_blocks(functions), {}, tuple(notes))
     named = _with_coherence(frfs, functions)
@@ -54,7 +51,7 @@ def _cut_off(stream: BinaryIO) -> list[str]:
     """A warning where the last dataset has no end."""
     size = stream.seek(0, os.SEEK_END)
     stream.seek(max(0, size - 200))
-    ended = stream.read().rstrip().endswith(_END)
+    ended = stream.read().rstrip().endswith(b"-1")
     stream.seek(0)
     return [] if ended else ["the last dataset has no end and is left out: the file is cut off"]
 
@@ -68,7 +65,8 @@ def _function(universal: Any, index: int, file: str) -> dict[str, Any]:
         announced, stored = int(function["num_pts"]), len(function["data"])
     if stored < announced or len(function["x"]) < announced or announced < 1:
         raise FileError(file, place, f"holds {stored} of the {announced} points that it announces")
-    return {**function, "x": function["x"][:announced], "data": function["data"][:announced], "number": index + 1}
+    columns = {name: function[name][:announced] for name in ("x", "data")}
+    return {**function, **columns, "number": index + 1, "axis": int(function["abscissa_spec_data_type"])}
 
 
 def _with_coherence(frfs: list[dict[str, Any]], functions: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -97,8 +95,7 @@ def _about(frf: dict[str, Any]) -> dict[str, str]:
 
 def _place(frf: dict[str, Any], of: str) -> str:
     """The entity's name of a node, or its number."""
-    entity = _text(frf[f"{of}_ent_name"])
-    return entity if entity else str(int(frf[f"{of}_node"]))
+    return _text(frf[f"{of}_ent_name"]) or str(int(frf[f"{of}_node"]))
 
 
 def _frf_block(name: str, frf: dict[str, Any], channel: str) -> Block:
@@ -123,21 +120,17 @@ def _blocks(functions: list[dict[str, Any]]) -> tuple[Block, ...]:
 
 
 def _same_abscissa(first: dict[str, Any], second: dict[str, Any]) -> bool:
-    return _axis(first) == _axis(second) and np.array_equal(first["x"], second["x"])
-
-
-def _axis(function: dict[str, Any]) -> int:
-    return int(function["abscissa_spec_data_type"])
+    return bool(first["axis"] == second["axis"]) and np.array_equal(first["x"], second["x"])
 
 
 def _block(functions: list[dict[str, Any]]) -> Block:
     first = functions[0]
     channels = [Channel(_name(function), _unit(function), np.asarray(function["data"])) for function in functions]
     step = float(first["abscissa_inc"]) if first["abscissa_spacing"] == 1 else 0.0
-    if _axis(first) == _TIME and step > 0:
+    if first["axis"] == _TIME and step > 0:
         return Block(f"dataset {first['number']}", with_distinct_names(channels), 1 / step)
     names = {_TIME: "time", _FREQUENCY: "frequency"}
-    name = names.get(_axis(first)) or _text(first["abscissa_axis_lab"]) or "abscissa"
+    name = names.get(first["axis"]) or _text(first["abscissa_axis_lab"]) or "abscissa"
     abscissa = Channel(name, _text(first["abscissa_axis_units_lab"]), np.asarray(first["x"], dtype=np.float64))
     return Block(f"dataset {first['number']}", with_distinct_names([abscissa, *channels]))
 
