@@ -521,10 +521,6 @@ AXES = ("x_mm", "y_mm")  # of a position
 
 def common_value(name: str, value: Any | Property, stated: Stated, file: str) -> Any:
     """The value of a field from the rig description, or from the property that it names, in the field's unit."""
-    if isinstance(value, list) and name in _OF_PARTS:
-        return [common_value(axis, part, stated, file) for axis, part in zip(AXES, value, strict=False)]
-    if isinstance(value, Mapping) and name in _OF_PARTS:
-        return {key: common_value(key, part, stated, file) for key, part in value.items()}
     if not isinstance(value, Property):
         return value
     given = _property_value(value, stated, file)

@@ -184,20 +184,23 @@ class MappedBlock:
         values = {}
         for field, value in self.rig.recording.items():
             try:
-                values[field] = common_value(field, self.row_value(field, value), self.stated, self.file)
+                values[field] = self._common_value(field, value)
             except UnreadableTime as error:
                 self.warnings.append(str(error))
         return tension.of_sample(values, self.file) if self.rig.is_pulled else values
 
-    def row_value(self, field: str, value: Any) -> Any:
-        """The value of a field that a column holds in all rows of this recording, in the field's unit; of lists and
-        mappings of each part; others as they are."""
+    def _common_value(self, field: str, value: Any) -> Any:
+        """The value of a field in its unit; of lists and mappings of each part."""
         if isinstance(value, list):
-            return [self.row_value(axis, part) for axis, part in zip(AXES, value, strict=False)]
+            return [self._common_value(axis, part) for axis, part in zip(AXES, value, strict=False)]
         if isinstance(value, Mapping):
-            return {name: self.row_value(name, part) for name, part in value.items()}
-        if not isinstance(value, SignalMapping):
-            return value
+            return {name: self._common_value(name, part) for name, part in value.items()}
+        if isinstance(value, SignalMapping):
+            return self._row_value(field, value)
+        return common_value(field, value, self.stated, self.file)
+
+    def _row_value(self, field: str, value: SignalMapping) -> Any:
+        """The value of a field that a column holds in all rows of this recording, in the field's unit."""
         words = self.block.words(value.channel)
         if words is not None:
             text = words.texts[words.codes[0]]
