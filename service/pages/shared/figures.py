@@ -1,30 +1,23 @@
 """A plotly figure in a page: its JSON, its description, and the address of its numbers."""
 
-import re
-import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
 import numpy as np
 import orjson
-from fastapi import Response
 from markupsafe import Markup
 
 from service.pages.shared.assets import LIBRARY, gzipped
 from service.pages.shared.formats import json_inside
 from service.store import AnyRow
-from underskin.prediction.columns import to_spreadsheet
 from underskin.recordings.campaign import CurveRecording, FrfRecording, Recording
 from underskin.units import Floats
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-_NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
-_LONGEST_PART = 60  # characters, of a name
 CLICK = "Click a sensor to choose it."
 
 
@@ -91,42 +84,6 @@ def _there_and_back(curve: CurveRecording) -> list[tuple[str, Floats, Floats]]:
     if not 0 < turn < len(depth) - 1:
         return []
     return [("loading", depth[: turn + 1], force[: turn + 1]), ("way back", depth[turn:], force[turn:])]
-
-
-class CsvAnswer(Response):
-    """Columns as a CSV file to be saved; the columns themselves too, as numbers and texts are one in its text."""
-
-    def __init__(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
-        super().__init__(to_spreadsheet(columns), headers=_saved(f"{name}.csv"), media_type="text/csv; charset=utf-8")
-        self.name, self.columns = name, columns
-
-
-def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> CsvAnswer:
-    """Columns as a CSV file to be saved."""
-    return CsvAnswer(name, columns)
-
-
-def attachment(file: str, content: str | bytes, media_type: str, **headers: str) -> Response:
-    """A file to be saved."""
-    return Response(content, headers=_saved(file) | headers, media_type=media_type)
-
-
-def file_name(*parts: str) -> str:
-    """A file name made of skin, campaign and so on, without characters that file systems reject."""
-    plain = (_NOT_IN_NAMES.sub("-", part)[:_LONGEST_PART].strip("-.") for part in parts)
-    return "-".join(part for part in plain if part)
-
-
-def _saved(file: str) -> dict[str, str]:
-    """Headers of a file to be saved; a name beyond ASCII also as RFC 6266 has it."""
-    plain = unicodedata.normalize("NFKD", file).encode("ascii", "ignore").decode()
-    disposition = f'attachment; filename="{plain}"' + ("" if plain == file else f"; filename*=UTF-8''{quote(file)}")
-    return {"Content-Disposition": disposition, "X-Content-Type-Options": "nosniff"}
-
-
-def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> CsvAnswer:
-    """Rows as a CSV file of these columns; a cell is NaN where a row lacks it."""
-    return csv_answer(name, dict(zip(names, columns_of(rows, *names), strict=True)))
 
 
 def columns_of(rows: Sequence[Mapping[str, Any]], *names: str) -> list[list[Any]]:

@@ -2,9 +2,9 @@
 request's field names."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 from urllib.parse import parse_qs
 
 from fastapi import Depends, Request
@@ -171,6 +171,11 @@ def numbers(name: str, line: str, parts: Sequence[str] = ()) -> list[float]:
     if wrong:
         raise SeveralInvalid(wrong)
     return read
+
+
+def labels_of(fields: Iterable[tuple[Any, ...]]) -> dict[str, str]:
+    """The labels of a form, with the unit, from rows that begin with field, words and unit."""
+    return {name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in fields}
 
 
 def in_form_words(

@@ -7,7 +7,7 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from service.ingest.reading import InspectedFile
-from service.pages.shared.figures import CsvAnswer, attachment, csv_answer
+from service.pages.shared.downloads import Numbers, attachment, downloadable
 from service.pages.upload.figures import lines_columns, trace_columns
 from service.pages.upload.looking import in_turn, looked
 from service.pages.upload.of_session import Pending
@@ -26,14 +26,14 @@ def rig_json(pending: Pending) -> Response:
     return attachment("rig.json", content, "application/json")
 
 
-@router.get("/{upload_id}/{file}/traces.csv")
-async def traces_csv(request: Request, pending: Pending, file: int) -> Response:
+@downloadable(router, "/{upload_id}/{file}/traces")
+async def traces_csv(request: Request, pending: Pending, file: int) -> Numbers:
     """The channels of a file's first part."""
     return await in_turn(_csv, "traces", trace_columns, request, pending, file)
 
 
-@router.get("/{upload_id}/{file}/frf.csv")
-async def frf_csv(request: Request, pending: Pending, file: int) -> Response:
+@downloadable(router, "/{upload_id}/{file}/frf")
+async def frf_csv(request: Request, pending: Pending, file: int) -> Numbers:
     """The FRFs of a file."""
     return await in_turn(_csv, "frf", lines_columns, request, pending, file)
 
@@ -44,5 +44,5 @@ def _csv(
     request: Request,
     pending: PendingUpload,
     file: int,
-) -> CsvAnswer:
-    return csv_answer(name, columns(looked(request, pending, file)))
+) -> Numbers:
+    return Numbers(name, columns(looked(request, pending, file)))

@@ -5,7 +5,7 @@ from typing import Any
 
 from service.ingest.accept import RIG
 from service.ingest.field_words import CHANNELS, RECORDING, SKIN
-from service.pages.shared.forms import UNLIKELY, unsigned, worded
+from service.pages.shared.forms import UNLIKELY, labels_of, unsigned, worded
 from service.pages.upload import spring_mapping, workbench
 from service.pages.upload.file_summary import ChannelSummary
 from service.pages.upload.mapping import CHOICES, RATE
@@ -14,7 +14,7 @@ from underskin.errors import ErrorCode
 _WORDS = {
     **CHOICES,
     spring_mapping.SPRING: "spring constant [N/m]",
-    **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
+    **labels_of((*SKIN, *RECORDING)),
     "sensors": "layout",
     "sign": "“automatic” as the sign",
     RATE: "sample rate [Hz]",

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 from urllib.parse import quote
 
@@ -12,17 +13,19 @@ from markupsafe import Markup
 from sqlalchemy import Connection
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
-from service.pages.diagnosis.array import shown_array
-from service.pages.diagnosis.plan import FIELDS, is_undecided
-from service.pages.diagnosis.planned import PlannedRow, heads, planned_rows, rig_answer
+from service.pages.plan import FIELDS, PlannedRow, heads, is_undecided, planned_rows, rig_answer
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
+from service.pages.shared.downloads import Numbers, attachment, downloadable
+from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, drawn_before, sensors_of
 from service.pages.shared.forms import FORM_OF_SESSION, Form, see
+from service.pages.shared.history import drawn_history
 from service.pages.shared.html import page, render
 from service.problems import Refusal
 from service.store import AnyRow, Database, Missing, campaigns, diagnoses, models, skins
+from service.usecases import d33_cache
 from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
+from service.usecases.skins import history_by_model
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.reporting.figure_columns import columns
@@ -30,12 +33,17 @@ from underskin.diagnosis.reporting.wording import planned_columns
 from underskin.findings.formatting import in_digits
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.vocabulary import OF_SAMPLES, followed
+from underskin.surrogate.sigma_table import SigmaTable
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
+_D33 = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
+_ABOUT_SENSOR = (
+    "One recording of {sensor} with the models before and after, the worst explained one first; below, measured less "
+    "predicted on the band that 95 % of the noise stays in."
+)
 router = APIRouter()
-
 _CAMPAIGN = re.compile(r"\bc-[0-9a-f]{16}\b")  # the id of one
 _ABOUT = {
     "where": "Each cell is the mean over the recordings in it, empty where there is none.",
@@ -55,6 +63,77 @@ _ABOUT = {
     "parameters": "Each parameter's most probable value and 95 % interval; next to it, what was known before.",
 }
 _ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # of a report that came with an import
+
+
+@dataclass(frozen=True)
+class ShownArray:
+    """The fitted sensors, the chosen one, the figures, and the rows of its recordings."""
+
+    sensors: list[str]
+    chosen: str | None
+    figures: list[Drawn]
+    rows: list[dict[str, Any]]
+
+
+def shown_array(
+    store: Database, table: SigmaTable, row: AnyRow, texts: Mapping[str, str], sensor: str | None
+) -> ShownArray | None:
+    """For the diagnosis `row` of one campaign with the figures `texts`; None if it shows no FRFs of sensors."""
+    if "frf" not in texts:
+        return None
+    figure = orjson.loads(texts["frf"])
+    meta = figure["layout"]["meta"]
+    sensors = sorted(set(meta["sensors"]))
+    sensor = sensor if sensor in sensors else None
+    campaign = store.read(campaigns.find, row.campaign_id)
+    of_sensors = sensors_of(campaign, d33_cache.answer(store, table, campaign, None))
+    if not of_sensors:
+        return None
+    figures = [_map(campaign, of_sensors, sensor)]
+    if sensor is None:
+        return ShownArray(sensors, None, figures, [])
+    indices = [number for number, name in enumerate(meta["sensors"]) if name == sensor]
+    root = store.read(skins.require_root, campaign.skin_id)
+    computed = d33_cache.complete(store, table, root)
+    history = drawn_history(root, history_by_model(store, table, root, "paper", computed), sensor, "paper")
+    about = _ABOUT_SENSOR.format(sensor=sensor)
+    frf = drawn_before("frf", _only(figure, indices), about, f"/diagnoses/{row.id}/frf.csv")
+    return ShownArray(
+        sensors, sensor, [*figures, replace(frf, name="frf-of-sensor"), history], _recording_rows(meta, indices)
+    )
+
+
+def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None) -> Drawn:
+    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
+
+    names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(
+        rows, "sensor", *_D33, "x_mm", "y_mm", "reasons"
+    )
+    quantity = Quantity("d33", "pC/N", intervals=tuple(zip(low, high, strict=True)))
+    radius = campaign.about["skin"].get("sensor_radius_mm")
+    figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, sensor, radius)
+    about = (
+        f"Each sensor where it lies, coloured by its d33 by the paper's model. {disc_size(x_mm, y_mm, radius)} "
+        f"{significance_note(d33, uncertainty)} {CLICK}"
+    )
+    return drawn("map", figure, about, f"/campaigns/{quote(campaign.id, safe='')}/d33.csv")
+
+
+def _only(figure: Mapping[str, Any], numbers: list[int]) -> str:
+    """The FRF figure restricted to these recordings."""
+    for menu in figure["layout"].get("updatemenus", []):
+        menu["buttons"] = [menu["buttons"][number] for number in numbers]
+    return orjson.dumps(figure).decode()
+
+
+def _recording_rows(meta: Mapping[str, Any], numbers: list[int]) -> list[dict[str, Any]]:
+    """Recordings with sphere, preload and the residual of either model; figures of older versions have only the
+    names."""
+    columns = ("indenters_mm", "preloads_n", "left_percent")
+    return [
+        {"recording": meta["recordings"][number], **{name: meta[name][number] for name in columns if name in meta}}
+        for number in numbers
+    ]
 
 
 @router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, FORM_OF_SESSION])
@@ -151,14 +230,14 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
     return attachment(f"{row.id}.html", content, "text/html; charset=utf-8", **policy)
 
 
-@router.get("/diagnoses/{diagnosis_id}/planned.csv")
-def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Response:
+@downloadable(router, "/diagnoses/{diagnosis_id}/planned")
+def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Numbers:
     """The recordings that the report plans, one per row."""
     row, report, _ = _done(store, diagnosis_id)
     planned = (report["next_experiment"] or {}).get("recordings", [])
     if not planned:
         raise Refusal(404, f"Diagnosis {diagnosis_id!r} plans no recordings.")
-    return csv_answer(f"{row.id}-plan", planned_columns(planned))
+    return Numbers(f"{row.id}-plan", planned_columns(planned))
 
 
 @router.get("/diagnoses/{diagnosis_id}/planned/{number}/rig.yaml")
@@ -168,14 +247,14 @@ def planned_rig(diagnosis_id: DiagnosisId, number: Annotated[int, Path(ge=1)], s
     return rig_answer(store, row, _planned(store, row, report), number)
 
 
-@router.get("/diagnoses/{diagnosis_id}/{figure}.csv")
-def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Response:
+@downloadable(router, "/diagnoses/{diagnosis_id}/{figure}")
+def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Numbers:
     """The numbers of a figure."""
     row, report, figures = _done(store, diagnosis_id)
     if figure not in _ABOUT:
         raise Refusal(404, f"There is no figure {figure!r}.")
     try:
-        return csv_answer(f"{row.id}-{figure}", columns(figure, report, figures))
+        return Numbers(f"{row.id}-{figure}", columns(figure, report, figures))
     except _ODD:
         _cannot_be_shown(row)
 

@@ -14,7 +14,7 @@ from service.problems import Refusal
 
 router = APIRouter()
 
-_FOLDER = Path(__file__).parents[3] / "docs"
+_FOLDER = Path(__file__).parents[2] / "docs"
 _LINK = re.compile(r"(!?)\[([^]]+)\]\(([^)#]*)(#[^)]*)?\)")
 _NOT_WORD = re.compile(r"[^\w -]")
 _FIRST = ("quickstart", "recordings", "diagnosis", "http-api")  # the others follow by name

@@ -1,25 +1,26 @@
 """d33 from single measured values of the FRF, without a file of recordings."""
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
-from service.pages.measured.adopted_model import ByModel, by_model
 from service.pages.shared import same_request
-from service.pages.shared.figures import csv_answer
-from service.pages.shared.forms import UNLIKELY, in_form_words, numbers
+from service.pages.shared.downloads import Numbers, downloadable
+from service.pages.shared.forms import UNLIKELY, in_form_words, labels_of, number, numbers
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import FIELDS as SKIN_FIELDS
 from service.pages.shared.skin_values import UNITS, shown
 from service.pages.shared.wrong_fields import NOTHING_WRONG, errors_together, quantities, wrong_fields
-from service.problems import parsed
+from service.problems import Refusal, parsed
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
-from service.store import Database
+from service.store import Conflict, Database
+from service.usecases.adopted_models import model_in_force
 from service.usecases.pressed_skin import d33
 from underskin.errors import InvalidInput, TableError, UnderskinError, conflicting, noting, required, wrong_type
 from underskin.prediction.answers import other_contact
@@ -28,8 +29,18 @@ from underskin.recordings.validation import Check, declared, not_negative
 from underskin.recordings.validation import number as finite
 from underskin.surrogate.sigma_table import SigmaTable
 
-router = APIRouter(prefix="/d33")
+if TYPE_CHECKING:
+    from underskin.prediction.adopted_model import AdoptedModel
 
+
+# Words and unit of the additional values that a model may need besides sphere and preload.
+_NEEDED = {
+    "dynamic_force_n": ("dynamic force", "N"),
+    "dwell_s": ("time the preload was held", "s"),
+    "load_cycles": ("load cycles so far", ""),
+    "sensor": ("sensor", ""),
+}
+router = APIRouter(prefix="/d33")
 FIELDS = tuple(field for field in SKIN_FIELDS if field[0] != "d33_pc_per_n")
 _LONGEST = 20_000  # characters of the rows
 _WITHOUT_UNCERTAINTY = 3  # numbers of a row
@@ -43,7 +54,7 @@ _CHECKS: dict[str, Check] = {
 }  # of the numbers of a row, in order
 _ORDER = tuple(_CHECKS)
 _LABELS = {
-    **{name: f"{words} [{unit}]" if unit else words for name, words, unit in FIELDS},
+    **labels_of((*FIELDS, *((name, *words) for name, words in _NEEDED.items()))),
     "indenter_radius_mm": "sphere radius R",
     "preload_n": "preload F",
     "frf_pc_per_n": "FRF",
@@ -51,8 +62,55 @@ _LABELS = {
 }
 _WORDS = {"frf_pc_per_n": "FRF", "d33_pc_per_n": "d33"}  # that findings are about
 _ANSWERED = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "contact_radius_mm", "sigma", "mean_stress_mpa")
-
 RowsText = Annotated[str, Query(max_length=_LONGEST)]
+
+
+@dataclass(frozen=True)
+class ByModel:
+    """The result of the model in force for the same measurements.
+
+    `fields`: additional fields of the form (name, words, unit, value); `document`: the request of `POST /v1/d33` and
+    `answer`: its answer, both None if `unavailable` gives a reason.
+    """
+
+    fields: Sequence[tuple[str, str, str, str]] = ()
+    document: Mapping[str, Any] | None = None
+    answer: Columns | None = None
+    unavailable: str | None = None
+
+    def columns(self) -> dict[str, list[float]]:
+        """d33 by it, a row a measurement; none where it is unavailable."""
+        if self.answer is None:
+            return {}
+        names = {"d33_pc_per_n": "d33_adopted_pc_per_n", "d33_uncertainty_pc_per_n": "d33_adopted_uncertainty_pc_per_n"}
+        return {new: self.answer.full(name).tolist() for name, new in names.items()}
+
+
+def by_model(
+    store: Database, table: SigmaTable, skin: str | None, given: Mapping[str, str], document: Mapping[str, Any]
+) -> ByModel | None:
+    """The same by the model in force of the skin; None where there is none. `document`: the paper's request."""
+    if skin is None:
+        return None
+    try:
+        model = model_in_force(store, skin).model
+    except Refusal:
+        return None
+    except Conflict as outdated:
+        return ByModel(unavailable=str(outdated))
+    fields = [(name, *_NEEDED[name], given.get(name, "").strip()) for name in model.needs]
+    try:
+        document_of_model = {**document, **_needed(model, fields), "model": "adopted", "skin_id": skin}
+        return ByModel(fields, document_of_model, d33(table, store, D33Columns.model_validate(document_of_model)))
+    except UnderskinError as refused:
+        return ByModel(fields, unavailable=in_form_words(refused, _LABELS))
+
+
+def _needed(model: "AdoptedModel", fields: Sequence[tuple[str, str, str, str]]) -> dict[str, Any]:
+    if model.of_lines:
+        names = " and ".join(name.replace("_", " ") for name in model.of_lines)
+        raise required("FRF", f"one value is not enough: {names} depends on frequency, so upload recordings")
+    return {name: value if name == "sensor" else number(name, value) for name, _, _, value in fields if value}
 
 
 @router.get("")
@@ -90,13 +148,13 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
     )
 
 
-@router.get("/rows.csv")
-def rows_csv(request: Request, store: Store, table: Table, skin: str | None = None, rows: RowsText = _ROWS) -> Response:
+@downloadable(router, "/rows")
+def rows_csv(request: Request, store: Store, table: Table, skin: str | None = None, rows: RowsText = _ROWS) -> Numbers:
     """What was measured and what it says, a row a measurement."""
     values, _ = shown(store, table, request.query_params, skin, FIELDS)
     document = _document(values, request.query_params, rows)
     adopted = by_model(store, table, skin, request.query_params, document)
-    return csv_answer("d33", _columns(document, _answered(table, store, document), adopted, table))
+    return Numbers("d33", _columns(document, _answered(table, store, document), adopted, table))
 
 
 def _message(error: UnderskinError) -> str:

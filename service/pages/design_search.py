@@ -10,8 +10,9 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from service.dependencies import Store, Table
 from service.heavy_answers import computed_in_turn
-from service.pages.shared.figures import Drawn, csv_answer, drawn
-from service.pages.shared.forms import in_form_words
+from service.pages.shared.downloads import Numbers, downloadable
+from service.pages.shared.figures import Drawn, drawn
+from service.pages.shared.forms import in_form_words, labels_of
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import start
 from service.pages.shared.wrong_fields import NOTHING_WRONG, errors_together, quantity, wrong_fields
@@ -34,7 +35,7 @@ FIELDS = (
     ("least_pitch_mm", "smallest pitch that can be made", "mm", "0.5"),
     ("least_frf_pc_per_n", "least charge over force", "pC/N", "1"),
 )
-_LABELS = {name: f"{words} [{unit}]" for name, words, unit, _ in FIELDS}
+_LABELS = labels_of(FIELDS)
 
 
 @dataclass(frozen=True)
@@ -93,9 +94,8 @@ def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
     )
 
 
-@router.get("/region.csv")
-@computed_in_turn
-def region_csv(table: Table, typed: TypedInQuery) -> Response:
+@downloadable(router, "/region")
+def region_csv(table: Table, typed: TypedInQuery) -> Numbers:
     """Every examined pair of thickness and sensor radius."""
     with np.errstate(all="ignore"):
         searched = search(table, typed.demand)
@@ -108,7 +108,7 @@ def region_csv(table: Table, typed: TypedInQuery) -> Response:
         "frf_pc_per_n": region.frf_pc_per_n,
         "feasible": searched.feasible,
     }
-    return csv_answer("region", {name: values.ravel().tolist() for name, values in columns.items()})
+    return Numbers("region", {name: values.ravel().tolist() for name, values in columns.items()})
 
 
 def _figure(searched: Searched, typed: Typed) -> Drawn:

@@ -5,13 +5,14 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
+import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy import Connection
 
 from service.dependencies import Store, Table
-from service.pages.compare import curves
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, columns_of, csv_of_rows, drawn, file_name, sensors_of
+from service.pages.shared.downloads import Numbers, downloadable, file_name, numbers_of_rows
+from service.pages.shared.figures import Drawn, columns_of, drawn, sensors_of
 from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
@@ -21,8 +22,18 @@ from underskin.inversion.comparison import in_words, with_differences
 from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable
 
+_MODULUS_COLUMNS = (
+    "which",
+    "campaign",
+    "recording",
+    "youngs_modulus_mpa",
+    "youngs_modulus_uncertainty_mpa",
+    "statement",
+)
+_MOST_CURVES = 12  # of each campaign
+_NAMES = ("first", "second")
+_MODULUS = "youngs_modulus_mpa"
 router = APIRouter(prefix="/compare")
-
 _MOST_LISTED = 200
 _MOST_NAMED = 6  # sensors
 _SAME_POSITION_MM = 0.01
@@ -30,11 +41,55 @@ _COLUMNS = (
     "sensor", "first_pc_per_n", "first_uncertainty_pc_per_n", "second_pc_per_n", "second_uncertainty_pc_per_n",
     "difference_pc_per_n", "difference_uncertainty_pc_per_n", "difference_percent", "beyond_chance",
 )  # fmt: skip
-
 KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")
 WORDS = {"frf": "FRFs", "indentation": "indentations", "compression": "compressions"}
 Chosen = Annotated[str, Query(max_length=200)]
 ChosenKind = Annotated[Kind | None, Query()]
+
+
+def modulus_rows(kind: str, both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Young's modulus of each curve of a kind, first campaign first."""
+    return [
+        {"which": name, "campaign": row.id, **modulus}
+        for name, row, answer in zip(_NAMES, both, answers, strict=True)
+        for modulus in answer["moduli"]
+        if modulus["kind"] == kind
+    ]
+
+
+def _mean_moduli(of_curves: Sequence[Mapping[str, Any]]) -> list[Any]:
+    """The mean modulus of each campaign, and the difference second − first."""
+    from underskin.inversion.comparison import mean_moduli
+
+    first, second = (np.array([row[_MODULUS] for row in of_curves if row["which"] == name]) for name in _NAMES)
+    return mean_moduli(first, second)
+
+
+def _curve_figures(
+    store: Database, kind: str, both: Sequence[AnyRow], of_curves: Sequence[Mapping[str, Any]]
+) -> list[Drawn]:
+    """The curves of both, each campaign in a colour, and the modulus of each curve."""
+    from underskin.figures.curves import ForceCurve, curve_moduli, force_curves
+
+    curves, counts = [], []
+    for name, row in zip(_NAMES, both, strict=True):
+        campaign = store.read(campaigns.load, row, with_excluded=False)
+        curves_of_kind = [curve for curve in campaign.curves if curve.kind == kind]
+        counts.append(f"{min(len(curves_of_kind), _MOST_CURVES)} of {len(curves_of_kind)} of the {name}")
+        curves += [
+            ForceCurve(recording.id, recording.displacement_mm, recording.force_n, of=name)
+            for recording in curves_of_kind[:_MOST_CURVES]
+        ]
+    about = f"Curves as they were recorded: {' and '.join(counts)}."
+    which, names, modulus, uncertainty = columns_of(
+        of_curves, "which", "recording", _MODULUS, "youngs_modulus_uncertainty_mpa"
+    )
+    page = f"/compare/moduli.csv?first={both[0].id}&second={both[1].id}&kind={kind}"
+    description = "Young's modulus of each curve, with its 95 % interval by the noise of that curve alone."
+    return [
+        drawn("curves", force_curves(curves), about),
+        *([drawn("moduli", curve_moduli(which, names, modulus, uncertainty), description, page)] if of_curves else []),
+    ]
 
 
 @router.get("")
@@ -65,7 +120,7 @@ def compare(
     answers = [answer for answer, _ in with_numbers]
     is_two = first != second
     rows = _rows(answers) if is_two and kind == "frf" else []
-    of_curves = curves.rows(kind, both, answers) if is_two and kind != "frf" else []
+    of_curves = modulus_rows(kind, both, answers) if is_two and kind != "frf" else []
     maps = drawn_maps(both, answers, rows)
     if maps:
         maps += _overlaid(store, both, [numbers["spreads"] for _, numbers in with_numbers])
@@ -88,8 +143,8 @@ def compare(
         most_named=_MOST_NAMED,
         moved=elsewhere[:_MOST_NAMED],
         more_moved=len(elsewhere[_MOST_NAMED:]),
-        means=curves.means(of_curves) if of_curves else [],
-        figures=curves.figures(store, kind, both, of_curves) if is_two and kind != "frf" and both else maps,
+        means=_mean_moduli(of_curves) if of_curves else [],
+        figures=_curve_figures(store, kind, both, of_curves) if is_two and kind != "frf" and both else maps,
         same=same_request.get(request, f"/v1/campaigns/{first}/d33", f"client.campaigns.d33({first!r})"),
     )
 
@@ -143,20 +198,20 @@ def _kind(store: Database, table: SigmaTable, skin: str, first: str) -> Kind:
     return next((kind_name for kind_name in KINDS if kind_name in has), KINDS[0])
 
 
-@router.get("/moduli.csv")
-def moduli_csv(store: Store, table: Table, first: Chosen, second: Chosen, kind: Kind) -> Response:
+@downloadable(router, "/moduli")
+def moduli_csv(store: Store, table: Table, first: Chosen, second: Chosen, kind: Kind) -> Numbers:
     """Young's modulus of each curve of both campaigns."""
     both = [store.read(campaigns.find, campaign_id) for campaign_id in (first, second)]
-    rows = curves.rows(kind, both, [d33_cache.answer(store, table, row, None) for row in both])
-    return csv_of_rows(_file(both, "moduli"), curves.COLUMNS, rows)
+    rows = modulus_rows(kind, both, [d33_cache.answer(store, table, row, None) for row in both])
+    return numbers_of_rows(_file(both, "moduli"), _MODULUS_COLUMNS, rows)
 
 
-@router.get("/difference.csv")
-def difference_csv(store: Store, table: Table, first: Chosen, second: Chosen) -> Response:
+@downloadable(router, "/difference")
+def difference_csv(store: Store, table: Table, first: Chosen, second: Chosen) -> Numbers:
     """d33 of each sensor in both campaigns, and the second less the first."""
     both = [store.read(campaigns.find, campaign_id) for campaign_id in (first, second)]
     rows = _rows([d33_cache.answer(store, table, row, None) for row in both])
-    return csv_of_rows(_file(both, "difference"), _COLUMNS, rows)
+    return numbers_of_rows(_file(both, "difference"), _COLUMNS, rows)
 
 
 def _file(both: Sequence[AnyRow], what: str) -> str:

@@ -12,8 +12,9 @@ from fastapi import APIRouter, Request, Response
 from service.dependencies import Store, Table
 from service.heavy_answers import computed_in_turn
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, csv_answer, drawn
-from service.pages.shared.forms import UNLIKELY, in_form_words, number
+from service.pages.shared.downloads import Numbers, downloadable
+from service.pages.shared.figures import Drawn, drawn
+from service.pages.shared.forms import UNLIKELY, in_form_words, labels_of, number
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import UNITS, shown
 from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quantities, wrong_fields
@@ -36,7 +37,7 @@ FIELDS = (
     ("indenter_radius_mm", "sphere radius R", "mm"),
     ("preload_n", "force F", "N"),
 )
-_LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit in FIELDS}
+_LABELS = labels_of(FIELDS)
 _SKIN = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 _RADII, _DEPTHS = 73, 21
 FRAMES = 20  # of the load as it grows to the one that is asked for
@@ -98,15 +99,15 @@ def at_once(request: Request, table: Table) -> Response:
     return answer
 
 
-@router.get("/section.csv")
-def section_csv(request: Request, table: Table) -> Response:
+@downloadable(router, "/section")
+def section_csv(request: Request, table: Table) -> Numbers:
     """The stress at every depth and distance."""
     given = {name: number(name, request.query_params.get(name, "")) for name, *_ in FIELDS}
     field = _computed(table, given, 1, UNITS in request.query_params)
     r, depth = to_lab("r_mm", field.r), to_lab("depth_mm", field.depth)
     columns: dict[str, Any] = {"depth_mm": np.repeat(depth, r.size), "r_mm": np.tile(r, depth.size)}
     columns["sigma_zz_mpa"] = to_lab("sigma_zz_mpa", field.sigma_zz[0]).ravel()
-    return csv_answer("field", {name: column.tolist() for name, column in columns.items()})
+    return Numbers("field", {name: column.tolist() for name, column in columns.items()})
 
 
 def _tried(request: Request, table: SigmaTable, values: Mapping[str, str]) -> ShownField:

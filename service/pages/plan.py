@@ -1,30 +1,35 @@
 """The next measurement within the limits of the reader's rig; planned in a worker process, and not stored."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
+import yaml
 from fastapi import APIRouter, Path, Request, Response
 from fastapi.responses import JSONResponse
 
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned, Planner
-from service.pages.diagnosis.planned import PlannedRow, heads, planned_rows, rig_answer
 from service.pages.shared import same_request
-from service.pages.shared.figures import csv_of_rows, file_name
-from service.pages.shared.forms import in_form_words, number, numbers
+from service.pages.shared.downloads import Numbers, attachment, downloadable, file_name, numbers_of_rows
+from service.pages.shared.forms import in_form_words, labels_of, number, numbers
 from service.pages.shared.html import page
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses
-from underskin.diagnosis.reporting.wording import in_a_cell, readable
+from service.usecases import planned_recordings
+from underskin.diagnosis.reporting.wording import axis, in_a_cell, readable
 from underskin.errors import UnderskinError, out_of_range, required
 
 if TYPE_CHECKING:
     from underskin.diagnosis.planning.rig_limits import RigLimits
 
+_HEADS = {
+    "indenter_radius_mm": "sphere radius [mm]", "position_mm": "place x, y [mm]", "dwell_s": "hold [s]",
+}  # fmt: skip
 router = APIRouter(prefix="/diagnoses/{diagnosis_id}/plan")
-
 _LOWEST, _HIGHEST, _RECORDINGS = "lowest_preload_n", "highest_preload_n", "recordings"
+
 # Field, words, unit, whether it takes several numbers.
 FIELDS = (
     (_LOWEST, "lowest preload", "N", False),
@@ -36,7 +41,7 @@ FIELDS = (
     (_RECORDINGS, "recordings at most (empty: 8)", "", False),
 )
 _SEVERAL = tuple(name for name, _, _, many in FIELDS if many)
-_LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit, _ in FIELDS} | {
+_LABELS = labels_of(FIELDS) | {
     "preload_n": "lowest and highest preload [N]",
     _RECORDINGS: "recordings at most",
 }
@@ -44,6 +49,50 @@ _COUNT = re.compile(r"[0-9]{1,9}")
 _MOST_VALUES = 8
 _MOST_RECORDINGS = 50
 _SURVIVES = 0.02  # less probable ones are not weighed
+
+
+@dataclass(frozen=True)
+class PlannedRow:
+    """A planned recording: its conditions by field, the number of repeats, and how many have arrived."""
+
+    values: Mapping[str, Any]
+    repeats: int
+    arrived: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether all have arrived."""
+        return self.arrived >= self.repeats
+
+
+def planned_rows(store: Database, row: AnyRow, plan: Mapping[str, Any] | None) -> list[PlannedRow]:
+    """Those of a plan after the diagnosis `row`."""
+    entries = (plan or {}).get("recordings", [])
+    counts = store.read(planned_recordings.arrived, row, entries)
+    return [
+        PlannedRow(
+            {name: value for name, value in planned.items() if name != "repeats" and value != []},
+            planned["repeats"],
+            count,
+        )
+        for planned, count in zip(entries, counts, strict=True)
+    ]
+
+
+def heads(rows: Sequence[PlannedRow]) -> dict[str, str]:
+    """The table headings of the conditions."""
+    return {name: _HEADS.get(name) or axis(name) for row in rows for name in row.values}
+
+
+def rig_answer(store: Database, row: AnyRow, rows: Sequence[PlannedRow], number: int) -> Response:
+    """The rig description of the planned recording `number`, counted from 1, with which its file can be sent."""
+    if number > len(rows):
+        raise Refusal(404, f"The plan has {len(rows)} recordings.")
+    with store.reading() as connection:
+        campaign = campaigns.find(connection, row.campaign_id)
+        document = planned_recordings.rig_description(connection, campaign, rows[number - 1].values)
+    content = yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+    return attachment(f"rig-{number}.yaml", content, "application/yaml")
 
 
 def is_undecided(report: Mapping[str, Any]) -> bool:
@@ -90,8 +139,8 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
     )
 
 
-@router.get("/recordings.csv")
-def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
+@downloadable(router, "/recordings")
+def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Numbers:
     """The planned recordings, one per row, and how many of each have arrived."""
     rows = _rows_of_address(request, diagnosis_id, planner, store)
     names = list(dict.fromkeys(name for planned in rows for name in planned.values))
@@ -99,7 +148,7 @@ def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: Planner
     counts = [{"repeats": planned.repeats, "arrived": planned.arrived} for planned in rows]
     joined = [values | count for values, count in zip(cells, counts, strict=True)]
     row, name = _diagnosed(store, diagnosis_id)
-    return csv_of_rows(file_name(row.skin_id, name, "plan"), [*names, "repeats", "arrived"], joined)
+    return numbers_of_rows(file_name(row.skin_id, name, "plan"), [*names, "repeats", "arrived"], joined)
 
 
 @router.get("/{number}/rig.yaml")
