@@ -23,12 +23,10 @@ from service.pages import (
     tables,
 )
 from service.pages.shared import assets
-from service.pages.upload import discarding as upload_discarding
-from service.pages.upload import downloads as upload_downloads
 from service.pages.upload import page as upload
 
 _PAGES = (
-    start, skin, campaign, changes, compare, fleet, diagnosis, plan, upload, upload_discarding, upload_downloads,
+    start, skin, campaign, changes, compare, fleet, diagnosis, plan, upload,
     design, design_search, field, array, measured, tables, mechanisms, docs, login, assets,
 )  # fmt: skip
 

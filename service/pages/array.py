@@ -23,18 +23,22 @@ from service.pages.shared import same_request
 from service.pages.shared.downloads import Numbers, downloadable
 from service.pages.shared.figures import Drawn, drawn
 from service.pages.shared.forms import (
+    NOTHING_WRONG,
     TOKEN,
     UNLIKELY,
+    WrongFields,
+    errors_together,
     in_form_words,
     label_of,
     labels_of,
     number,
     numbers,
+    quantities,
     require_form_token,
+    wrong_fields,
 )
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import FIELDS, UNITS, shown
-from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, errors_together, quantities, wrong_fields
 from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
 from underskin.array_stress import pressure_map

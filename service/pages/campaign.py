@@ -10,13 +10,12 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from service.dependencies import CampaignId, Store, Table
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.attention import attention
-from service.pages.shared.conditions import condition_columns
 from service.pages.shared.downloads import Numbers, downloadable, file_name, numbers_of_rows
-from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, drawn_curves, sensors_of
+from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, drawn_curves, drawn_frf, sensors_of
+from service.pages.shared.formats import condition_columns
 from service.pages.shared.forms import RefusedForm, in_form_words, number
-from service.pages.shared.frf import drawn_frf
 from service.pages.shared.html import page
+from service.pages.shared.verdicts import attention
 from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, annotations, campaigns, diagnoses
 from service.usecases import changes, d33_cache

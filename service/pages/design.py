@@ -14,10 +14,18 @@ from service.pages.shared import same_request
 from service.pages.shared.downloads import Numbers, downloadable
 from service.pages.shared.figures import Drawn, drawn
 from service.pages.shared.formats import change_in_percent, short_and_exact
-from service.pages.shared.forms import in_form_words, labels_of, see
+from service.pages.shared.forms import (
+    NOTHING_WRONG,
+    WrongFields,
+    errors_together,
+    in_form_words,
+    labels_of,
+    quantity,
+    see,
+    wrong_fields,
+)
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import start
-from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, errors_together, quantity, wrong_fields
 from service.problems import parsed
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of, other_sigma, require_apart

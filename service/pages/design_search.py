@@ -12,10 +12,9 @@ from service.dependencies import Store, Table
 from service.heavy_answers import computed_in_turn
 from service.pages.shared.downloads import Numbers, downloadable
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.forms import in_form_words, labels_of
+from service.pages.shared.forms import NOTHING_WRONG, errors_together, in_form_words, labels_of, quantity, wrong_fields
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import start
-from service.pages.shared.wrong_fields import NOTHING_WRONG, errors_together, quantity, wrong_fields
 from service.problems import parsed
 from service.schemas.design import DesignDemand
 from service.usecases.design_search import NEARLY, Offer, Searched, search

@@ -16,9 +16,8 @@ from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, St
 from service.pages.plan import FIELDS, PlannedRow, heads, is_undecided, planned_rows, rig_answer
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.downloads import Numbers, attachment, downloadable
-from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, drawn_before, sensors_of
+from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, drawn_before, drawn_history, sensors_of
 from service.pages.shared.forms import FORM_OF_SESSION, Form, see
-from service.pages.shared.history import drawn_history
 from service.pages.shared.html import page, render
 from service.problems import Refusal
 from service.store import AnyRow, Database, Missing, campaigns, diagnoses, models, skins

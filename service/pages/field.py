@@ -14,10 +14,18 @@ from service.heavy_answers import computed_in_turn
 from service.pages.shared import same_request
 from service.pages.shared.downloads import Numbers, downloadable
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.forms import UNLIKELY, in_form_words, labels_of, number
+from service.pages.shared.forms import (
+    NOTHING_WRONG,
+    UNLIKELY,
+    WrongFields,
+    in_form_words,
+    labels_of,
+    number,
+    quantities,
+    wrong_fields,
+)
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import UNITS, shown
-from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quantities, wrong_fields
 from underskin.errors import TableError, UnderskinError
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
 from underskin.physics.hertz import peak_pressure

@@ -11,11 +11,20 @@ from fastapi import APIRouter, Query, Request, Response
 from service.dependencies import Store, Table
 from service.pages.shared import same_request
 from service.pages.shared.downloads import Numbers, downloadable
-from service.pages.shared.forms import UNLIKELY, in_form_words, labels_of, number, numbers
+from service.pages.shared.forms import (
+    NOTHING_WRONG,
+    UNLIKELY,
+    errors_together,
+    in_form_words,
+    labels_of,
+    number,
+    numbers,
+    quantities,
+    wrong_fields,
+)
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import FIELDS as SKIN_FIELDS
 from service.pages.shared.skin_values import UNITS, shown
-from service.pages.shared.wrong_fields import NOTHING_WRONG, errors_together, quantities, wrong_fields
 from service.problems import Refusal, parsed
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns

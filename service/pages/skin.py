@@ -15,14 +15,21 @@ from starlette.background import BackgroundTask
 
 from service.dependencies import SkinId, Store, Table, number_of_cursor
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.attention import attention
 from service.pages.shared.downloads import Numbers, downloadable, file_name, numbers_of_rows
-from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, sensors_of
+from service.pages.shared.figures import (
+    CLICK,
+    RESTS,
+    By,
+    Drawn,
+    columns_of,
+    drawn,
+    drawn_frf,
+    drawn_history,
+    sensors_of,
+)
 from service.pages.shared.forms import RefusedForm
-from service.pages.shared.frf import drawn_frf
-from service.pages.shared.history import RESTS, By, drawn_history
 from service.pages.shared.html import page
-from service.pages.shared.verdicts import adopted_versions, answer_by_it, change_percent
+from service.pages.shared.verdicts import adopted_versions, answer_by_it, attention, change_percent
 from service.schemas.campaign_d33 import D33Value
 from service.schemas.diagnoses import DiagnosisKind
 from service.schemas.skins import History, SensorHistory, TrendAnswer

@@ -18,10 +18,10 @@ from service.dependencies import WRITE, Store, Table, number_of_cursor, sender
 from service.ingest.accept import IngestOptions, accept
 from service.ingest.uploads import Upload
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.attention import attention
 from service.pages.shared.figures import prepare
 from service.pages.shared.forms import FORM_OF_SESSION, see
 from service.pages.shared.html import page
+from service.pages.shared.verdicts import attention
 from service.problems import Refusal
 from service.store import Database, campaigns, overview, skins
 from service.usecases import d33_cache, mechanism_catalogue

@@ -1,9 +1,10 @@
 """Upload: files are read, shown channel by channel, and stored only on confirmation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any
 
+import orjson
 from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
@@ -11,30 +12,35 @@ from service.auth import session
 from service.dependencies import WRITE, Store, Table
 from service.ingest import field_words, rig_words, skin_imports
 from service.ingest.accept import RIG
-from service.ingest.reading import MOST_RECORDINGS, keeping
+from service.ingest.reading import MOST_RECORDINGS, InspectedFile, keeping
 from service.ingest.uploads import UploadFolder, received, texts
 from service.pages.shared import same_request
-from service.pages.shared.conditions import condition_columns
+from service.pages.shared.downloads import Numbers, attachment, downloadable
 from service.pages.shared.figures import Drawn
+from service.pages.shared.formats import condition_columns
 from service.pages.shared.forms import FORM_OF_SESSION, TOKEN, Form, require_form_token, see
 from service.pages.shared.html import page
-from service.pages.upload import (
-    error_words,
-    exported_skin,
-    file_summary,
-    recorded_time,
-    similar_errors,
-    single_files,
-    spring_mapping,
-    templates,
-    workbench,
-)
+from service.pages.upload import error_words, exported_skin, file_summary, templates
 from service.pages.upload import mapping as mappings
+from service.pages.upload.figures import lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, RecordingSummary
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, skin_of, take_rig
-from service.pages.upload.looking import channels_of, held_by_some, in_turn, is_unsaid, look_at_all, shown, used_twice
-from service.pages.upload.of_session import Pending
-from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
+from service.pages.upload.looking import (
+    CORRECTS,
+    SKIN_FIELD,
+    channels_of,
+    field_errors,
+    held_by_some,
+    in_turn,
+    is_unsaid,
+    keep_good,
+    look_at_all,
+    looked,
+    shown,
+    skin_of,
+    take_rig,
+    used_twice,
+)
+from service.pages.upload.pending_uploads import Pending, PendingUpload, PendingUploads, UploadOfSession
 from service.store import Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin import InvalidInput
@@ -42,13 +48,12 @@ from underskin.recordings import rig_description
 from underskin.recordings.frf.estimators import checked_estimator
 from underskin.recordings.rig_guess import guessed
 
-router = APIRouter(prefix="/upload")
-
 _LONGEST_FIELD = 1000  # bytes of a field other than the files
 _ESTIMATOR = "estimator"
 _ESTIMATORS = {"H1": "noise in the charge", "H2": "noise in the force", "Hv": "noise in both"}  # for which each is
 _MOST_SKINS = 200  # that the form offers
 _MOST_NAMED = 5  # files in the request that does the same
+router = APIRouter(prefix="/upload")
 
 
 @router.get("")
@@ -160,8 +165,8 @@ def _understood(
         corrected=None if pending.corrects is None else store.read(campaigns.find, pending.corrects),
         number=file,
         file=pending.seen[file],
-        groups=similar_errors.of_files(pending.seen),
-        refusals=similar_errors.of_recordings(pending.seen[file]),
+        groups=error_words.of_files(pending.seen),
+        refusals=error_words.of_recordings(pending.seen[file]),
         figures=figures,
         good=good,
         refused=sum(
@@ -192,13 +197,9 @@ def _understood(
         error_words=error_words,
         field_words=field_words,
         is_stated=lambda name: name == rig_description.BLOCK_NAME or file_summary.may_state(pending.seen, name),
-        spring=spring_mapping,
         carried_over=[] if pending.remembered is None or pending.rig is None else rig_words.typed_of(pending.rig),
-        workbench=workbench,
-        single_files=single_files,
-        recorded_time=recorded_time,
-        in_formulas=workbench.in_formulas(document, channels),
-        wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
+        in_formulas=mappings.in_formulas(document, channels),
+        wrong_formulas=mappings.formula_errors(pending.refused, pending.seen[file]),
         offered=templates.offered(store, pending, pending.seen[file]),
         same=same_request.files(
             request,
@@ -217,10 +218,10 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
     document, wrong = mappings.document_of(sent, base)
     guess = guessed(channels_of(pending), pending.seen[0].properties, {}, pending.seen[0].texts)
-    pending.draft = workbench.with_guesses(document, base, guess)
-    of_files = single_files.typed(sent, pending.files)
+    pending.draft = mappings.with_guesses(document, base, guess)
+    of_files = mappings.typed_of_files(sent, pending.files)
     units_checked = bool(document.get("units_checked"))
-    values, wrong_of_files = single_files.values_of(
+    values, wrong_of_files = mappings.values_of_files(
         of_files, pending.files, document["kind"], units_checked=units_checked
     )
     wrong += wrong_of_files
@@ -295,3 +296,48 @@ def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
     """What the campaigns of a skin say of it."""
     row = None if skin is None else store.read(campaigns.describing, skin)
     return {} if row is None else dict(row.about["skin"])
+
+
+@router.get("/{upload_id}/rig.json")
+def rig_json(pending: Pending) -> Response:
+    """The rig description in use."""
+    if pending.rig is None:
+        raise Missing("There is no rig description yet.")
+    content = orjson.dumps(pending.rig.document, option=orjson.OPT_INDENT_2)
+    return attachment("rig.json", content, "application/json")
+
+
+@downloadable(router, "/{upload_id}/{file}/traces")
+async def traces_csv(request: Request, pending: Pending, file: int) -> Numbers:
+    """The channels of a file's first part."""
+    return await in_turn(_csv, "traces", trace_columns, request, pending, file)
+
+
+@downloadable(router, "/{upload_id}/{file}/frf")
+async def frf_csv(request: Request, pending: Pending, file: int) -> Numbers:
+    """The FRFs of a file."""
+    return await in_turn(_csv, "frf", lines_columns, request, pending, file)
+
+
+def _csv(
+    name: str,
+    columns: Callable[[InspectedFile], Mapping[str, Sequence[Any]]],
+    request: Request,
+    pending: PendingUpload,
+    file: int,
+) -> Numbers:
+    return Numbers(name, columns(looked(request, pending, file)))
+
+
+@router.post("/{upload_id}/discard", dependencies=[*WRITE, FORM_OF_SESSION])
+def discard(pending: Pending) -> Response:
+    """Puts it aside; for a while it can be taken back."""
+    pending.discarded = True
+    return see("/upload")
+
+
+@router.post("/{upload_id}/restore", dependencies=[*WRITE, FORM_OF_SESSION])
+def restore(pending: UploadOfSession) -> Response:
+    """Takes back that it was discarded."""
+    pending.discarded = False
+    return see(f"/upload/{pending.id}")

@@ -14,15 +14,20 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from fastapi import Depends, Request
+
+from service.auth import session
 from service.ingest.uploads import Upload
 from service.pages.shared.figures import Drawn
 from service.pages.upload.file_summary import FileSummary
-from service.pages.upload.skin_summary import SkinSummary
 from service.store import Missing
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import RigDescription
+
+if TYPE_CHECKING:
+    from service.pages.upload.exported_skin import SkinSummary
 
 LASTS_S = 3600.0
 _MOST_UPLOADS = 50
@@ -70,7 +75,7 @@ class PendingUpload:
     corrects: str | None = None  # the campaign that it replaces
     reason: str = ""  # why it does
     who: str = ""  # that says so, as typed
-    skin_summary: SkinSummary | None = None  # where it is an exported skin
+    skin_summary: "SkinSummary | None" = None  # where it is an exported skin
     negative: bool = False  # whether curves of it count pressing negative
     turned: bool = False  # whether those were turned
     kept_at: str | None = None  # the page of the stored data
@@ -226,3 +231,22 @@ def _worth(held: PendingUpload) -> tuple[bool, float]:
 
 def _digest(cookie: str) -> str:
     return hashlib.sha256(cookie.encode()).hexdigest()
+
+
+def _upload(request: Request, upload_id: str) -> PendingUpload:
+    """The upload of an address; raises Missing if it is not the session's own."""
+    pending_uploads: PendingUploads = request.app.state.pending_uploads
+    return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
+
+
+UploadOfSession = Annotated[PendingUpload, Depends(_upload)]
+
+
+def _pending(upload: UploadOfSession) -> PendingUpload:
+    """The same unless it was discarded; raises Missing if it was."""
+    if upload.discarded:
+        raise Missing("This upload was discarded. For an hour it can be taken back on the page “Upload”.")
+    return upload
+
+
+Pending = Annotated[PendingUpload, Depends(_pending)]
