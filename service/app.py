@@ -30,7 +30,6 @@ from service.routes import (
     field,
     health,
     mechanisms,
-    metrics,
     models,
     openapi,
     pressed_skin,
@@ -98,7 +97,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
         settings.diagnosis_seconds,
         keeps_ready=settings.diagnosis_ready,
     )
-    metrics.watch_disk(settings.data)
+    health.watch_disk(settings.data)
     api.state.runner = Runner(store, processes, settings.diagnosis_workers)
     api.state.backups = (
         None
@@ -112,7 +111,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     of_skins = (campaigns, diagnoses, exports, skins, changes, models)
     for noun in (sigma, pressed_skin, stress, field, design, tables, *of_skins, mechanisms):
         api.include_router(noun.router, dependencies=guards)
-    for router in (umbridge.router, health.router, metrics.router, openapi.router):
+    for router in (umbridge.router, health.router, openapi.router):
         api.include_router(router)
     pages.add_to(api)
     return api

@@ -8,8 +8,7 @@ import typer
 from service.cli.shared import read_settings, use_folder_of_lab
 from service.jobs.process import CampaignInput, WorkerProcesses
 from service.settings import Settings
-from service.usecases.checkup import examine
-from service.usecases.observation import Level, Observation
+from service.usecases.checkup import Level, Observation, examine
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 _LIMIT_S = 120.0

@@ -19,8 +19,7 @@ from service.auth.keys import KeyStore
 from service.auth.sessions import Sessions
 from service.cli.shared import STORE_ERRORS, fail, read_settings, use_folder_of_lab
 from service.log import configure_logging
-from service.middleware.connection_limits import ConnectionLimits
-from service.middleware.http_protocol import limited
+from service.middleware.http_protocol import ConnectionLimits, limited
 from service.settings import make_data_folder, unknown_settings
 from service.store import open_store
 from underskin import ExtensionError, TableError

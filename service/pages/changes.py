@@ -15,8 +15,8 @@ from service.problems import parsed
 from service.schemas.diagnoses import AskForSkin
 from service.schemas.skins import Join
 from service.store import annotations, campaigns, changes, models, skins
-from service.usecases import annotations as written
 from service.usecases import campaigns as of_campaigns
+from service.usecases import changes as written
 from service.usecases import diagnoses as diagnosis_usecase
 from service.usecases import skins as of_skins
 

@@ -16,8 +16,7 @@ from service.pages.shared.forms import FORM_OF_SESSION, Form, see
 from service.pages.shared.html import page
 from service.problems import Refusal
 from service.usecases import mechanisms as usecase
-from service.usecases.mechanism_catalogue import catalogue, effect
-from service.usecases.mechanism_findings import findings
+from service.usecases.mechanism_catalogue import catalogue, effect, findings
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.figures.law_effect import RIG, EffectPanel, LawEffect
 from underskin.figures.style import COLOURS, GRID, INK

@@ -43,7 +43,6 @@ from service.store import (
     inversions,
     models,
     overview,
-    skin_changes,
     skins,
 )
 from service.usecases import changes, d33_cache
@@ -224,7 +223,7 @@ def shown(
         changed = changes.of_skin(connection, root)
         used = annotations.in_use(connection, root)
         places = usecase.sensors(connection, root)
-        mark = skin_changes.mark(connection, root, table.sha256)
+        mark = overview.mark(connection, root, table.sha256)
         together = [row for kind in _SEVERAL for row in _latest(connection, root, kind)]
         may_be_together = diagnosed_together.count_usable(connection, root) > 1
         model_row = models.last(connection, root)
@@ -339,7 +338,7 @@ def _latest(connection: Connection, root: str, kind: DiagnosisKind) -> Sequence[
 def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
     """A text that changes whenever anything on the page has changed."""
     with store.reading() as connection:
-        return {"mark": skin_changes.mark(connection, skins.require_root(connection, skin_id), table.sha256)}
+        return {"mark": overview.mark(connection, skins.require_root(connection, skin_id), table.sha256)}
 
 
 @downloadable(router, "/map")

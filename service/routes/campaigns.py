@@ -10,10 +10,9 @@ from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, CampaignId, Store, Table, number_of_cursor, sender
 from service.ingest.accept import RIG, IngestOptions, accept
-from service.ingest.form_fields import FILE, split
 from service.ingest.reading import keeping
-from service.ingest.uploads import received
-from service.middleware.unique_keys import JsonRoute
+from service.ingest.uploads import FILE, received, split
+from service.middleware.json_bodies import JsonRoute
 from service.routes.temporary_files import made_file
 from service.schemas import campaigns as models
 from service.schemas.campaign_d33 import D33

@@ -8,14 +8,14 @@ from pydantic import BaseModel
 from sqlalchemy import Connection
 
 from service.dependencies import WRITE, CampaignId, SkinId, Store, Table, sender
-from service.middleware.unique_keys import JsonRoute
+from service.middleware.json_bodies import JsonRoute
 from service.schemas import changes as models
 from service.schemas.campaigns import CampaignDetail
 from service.schemas.skins import SkinDetail
 from service.store import annotations, campaigns, skins
-from service.usecases import annotations as written
 from service.usecases import campaigns as of_campaigns
 from service.usecases import changes as usecase
+from service.usecases import changes as written
 from service.usecases import skins as of_skins
 
 router = APIRouter(prefix="/v1", route_class=JsonRoute)

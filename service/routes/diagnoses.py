@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, SkinId, Store, Table, number_of_cursor
 from service.jobs.runner import Runner
-from service.middleware.unique_keys import JsonRoute
+from service.middleware.json_bodies import JsonRoute
 from service.routes.idempotency import Idempotency, Idempotent
 from service.schemas import diagnoses as models
 from service.store import AnyRow, Database, diagnoses

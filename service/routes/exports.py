@@ -9,8 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, SkinId, Store
 from service.ingest import skin_imports
-from service.ingest.form_fields import split
-from service.ingest.uploads import UploadFolder, received
+from service.ingest.uploads import UploadFolder, received, split
 from service.problems import Refusal
 from service.routes.temporary_files import MadeFile, made_file
 from service.schemas.skins import Imported

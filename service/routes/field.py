@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query, Response
 
 from service.dependencies import Table
 from service.schemas.field import FieldAnswer, FieldQuery
-from service.usecases.field import field_answer
+from service.usecases.tables import field_answer
 
 router = APIRouter(prefix="/v1", tags=["field"])
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, Store
-from service.middleware.unique_keys import require_unique_keys
+from service.middleware.json_bodies import require_unique_keys
 from service.problems import Refusal, validated
 from service.schemas.mechanisms import KeepFound, MechanismEntry, MechanismList
 from service.usecases import mechanisms as usecase

@@ -7,7 +7,7 @@ from fastapi.responses import JSONResponse
 from sqlalchemy import Connection
 
 from service.dependencies import WRITE, SkinId, Store
-from service.middleware.unique_keys import JsonRoute
+from service.middleware.json_bodies import JsonRoute
 from service.problems import Refusal
 from service.routes.idempotency import Idempotent
 from service.schemas import diagnoses as answers

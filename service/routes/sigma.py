@@ -9,7 +9,7 @@ from service.dependencies import Table
 from service.middleware.asgi_middleware import HotRoute, are_numbers
 from service.routes.columns_endpoint import OTHER_ANSWERS, Accept, add_columns_route, respond
 from service.schemas.sigma import OneSigma, SigmaAnswer, SigmaColumns, SigmaQuery
-from service.usecases.sigma import sigma
+from service.usecases.tables import sigma
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/v1")

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request
 
 from service.dependencies import WRITE, SkinId, Store, Table, sender
-from service.middleware.unique_keys import JsonRoute
+from service.middleware.json_bodies import JsonRoute
 from service.schemas import skins as models
 from service.store import skins
 from service.usecases import d33_cache

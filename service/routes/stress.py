@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from service.routes.columns_endpoint import OTHER_ANSWERS, Accept, answer_json, described_body, respond
 from service.schemas.stress import StressAnswer, StressRequest
-from service.usecases import stress as usecase
+from service.usecases import tables as usecase
 from service.usecases.tables import influence_table
 from underskin.array_stress.request import read_request
 

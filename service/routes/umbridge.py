@@ -9,7 +9,7 @@ from orjson import dumps, loads
 
 from service.dependencies import Table
 from service.middleware.asgi_middleware import HotRoute, are_numbers
-from service.middleware.unique_keys import JsonRoute
+from service.middleware.json_bodies import JsonRoute
 from service.problems import Refusal
 from service.schemas import umbridge as models
 from service.usecases.umbridge_models import MODELS, UmbridgeModel

@@ -5,8 +5,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from service.schemas.described import DescribedBy
-from service.schemas.report import Report, ReportMechanism, Verdict
-from service.schemas.report_fit import Fit, Provenance
+from service.schemas.report import Fit, Provenance, Report, ReportMechanism, Verdict
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 DiagnosisKind = Literal["campaign", "skin", "fleet"]

@@ -11,7 +11,7 @@ from service.store import skins
 from service.store.diagnosed_together import has_one_of
 from service.store.engine import holds
 from service.store.errors import Conflict
-from service.store.skin_changes import numbers_of
+from service.store.overview import numbers_of
 from service.store.tables import AnyRow, campaigns, diagnoses, models, recordings
 from service.store.tables import skins as skin_rows
 from service.store.times import now

@@ -4,6 +4,12 @@ The requirement is the two-point separation of `POST /v1/design`: the distance f
 for every position of the row of sensors. The contacts are with the layer itself (`solved`). A thin layer spreads the
 stress less and a fine pitch samples it more densely; a sensor cannot be wider than the pitch, and two contacts cannot
 be nearer than touching.
+
+Two contacts show as two if a sensor between two others reads less than both, by `dip` times the reading above a sensor,
+for every position of the row of sensors and from that distance on (`underskin.prediction.skin_design`); it is evaluated
+on few placements and distances, in order to search many designs. The pitch cannot exceed half the distance: if the
+middle between the contacts lies midway between two sensors, each of these is nearer to its contact than the sensor
+beyond it and reads more, so that there is no dip.
 """
 
 from collections.abc import Sequence
@@ -15,21 +21,55 @@ import numpy as np
 from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
 from service.usecases.tables import requested_contact
-from service.usecases.two_point import largest_pitch
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
-from underskin.prediction.skin_design import resolution
+from underskin.prediction.skin_design import are_resolved, resolution
 from underskin.surrogate.off_centre_sigma import sigma_off_centre
 from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
+_PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
+_DISTANCES = 16
+_BISECTIONS = 7  # of a bisection
 THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # the search range, within the table
 _THICKNESSES, _RADII = 8, 6
 _CONTACT: ContactName = "solved"
 NEARLY = 0.95  # of the largest pitch: nearly as few sensors
 _INSIDE = 1.0001  # times the thinnest layer of the table
+
 # Beyond what it misses by, by how much at most in a step, and how often, a pitch is reduced until it meets the demand.
 _FINER, _STEP, _TIMES = 0.995, 0.95, 8
+
+
+def largest_pitch(offset: Floats, response: Floats, distance: float, finest: float, dip: float) -> float:
+    """The largest pitch [m], from `finest` on, at which two contacts are told apart from `distance` [m] on; NaN where
+    they are not even at `finest`.
+
+    Parameters
+    ----------
+    offset, response
+        (n,) distance of a contact from the sensor's centre [m], from 0 on, and the response there [-].
+    dip
+        Over the response above a sensor [-].
+    """
+    if finest > distance / 2 or not _are_all_resolved(offset, response, finest, distance, dip):
+        return float("nan")
+    low, high = finest, distance / 2
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        if _are_all_resolved(offset, response, middle, distance, dip):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _are_all_resolved(offset: Floats, response: Floats, pitch: float, distance: float, dip: float) -> bool:
+    """Whether two contacts show as two at this and every larger distance, for every placement of the row."""
+    width = 2 * float(offset[int(np.argmax(response < response[0] / 2))])
+    farthest = distance + 2 * pitch + 2 * width  # beyond it each contact is seen on its own, again and again
+    distances = np.linspace(distance, farthest, _DISTANCES)
+    return bool(are_resolved(offset, response, pitch, distances, _PLACEMENTS, dip).all())
 
 
 @dataclass(frozen=True)

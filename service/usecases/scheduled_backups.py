@@ -25,7 +25,7 @@ from prometheus_client import Counter, Gauge
 from service import durable
 from service.log import first_line
 from service.store import Database, StorageFailed, StoreError, backup, identity
-from service.usecases import mechanism_files
+from service.usecases import mechanisms
 
 logger = logging.getLogger("underskin")
 
@@ -173,7 +173,7 @@ class ScheduledBackups:
             suffix = ".sqlite3" if self._store.is_sqlite else ".pgdump"
             file = self._folder / f"{_PREFIX}{datetime.now(UTC):{_STAMP}}{suffix}"
             try:
-                self._store.write(mechanism_files.remember)
+                self._store.write(mechanisms.remember_files)
             except StorageFailed as error:  # an unwritable disk here must not prevent a backup elsewhere
                 logger.warning("mechanisms of the lab's own are in the backup as they were at the last one: %s", error)
             backup.make(self._store, file)

@@ -16,7 +16,7 @@ from service.auth import session
 from service.dependencies import sender
 from service.problems import Refusal
 from service.store import Conflict, Missing
-from service.usecases import annotations
+from service.usecases import changes
 from underskin.errors import (
     UNITS_CHECKED,
     InvalidInput,
@@ -106,7 +106,7 @@ def signed(request: Request, sent: Mapping[str, str]) -> str | None:
 
 def annotated(sent: Mapping[str, str]) -> dict[str, str | None]:
     """Remark and tags of a form as they are kept, None where empty. Raises InvalidInput."""
-    return {"remark": annotations.remark(sent.get("remark")), "tags": annotations.tags([sent.get("tags", "")])}
+    return {"remark": changes.remark(sent.get("remark")), "tags": changes.tags([sent.get("tags", "")])}
 
 
 def see(path: str) -> RedirectResponse:

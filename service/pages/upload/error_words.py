@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from service.ingest.accept import RIG
-from service.ingest.field_words import CHANNELS, RECORDING, SKIN
+from service.ingest.rig_words import CHANNELS, RECORDING, SKIN
 from service.pages.shared.forms import UNLIKELY, labels_of, unsigned, worded
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from service.pages.upload.mapping import CHOICES, RATE, SPRING, WORKBENCH_WORDS

@@ -8,8 +8,8 @@ from copy import deepcopy
 from datetime import datetime
 from typing import Any
 
-from service.ingest.field_words import CHANNELS, RECORDING, SKIN
 from service.ingest.reading import InspectedFile
+from service.ingest.rig_words import CHANNELS, RECORDING, SKIN
 from service.ingest.uploads import Upload
 from service.pages.shared.forms import number_or_text
 from service.pages.upload.file_summary import ChannelSummary, FileSummary

@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
 from service.dependencies import WRITE, Store, Table
-from service.ingest import field_words, rig_words, skin_imports
+from service.ingest import rig_words, skin_imports
 from service.ingest.accept import RIG
 from service.ingest.reading import MOST_RECORDINGS, InspectedFile, keeping
 from service.ingest.uploads import UploadFolder, received, texts
@@ -195,7 +195,7 @@ def _understood(
         layout=mappings.sensors_text(document),
         mapping=mappings,
         error_words=error_words,
-        field_words=field_words,
+        rig_words=rig_words,
         is_stated=lambda name: name == rig_description.BLOCK_NAME or file_summary.may_state(pending.seen, name),
         carried_over=[] if pending.remembered is None or pending.rig is None else rig_words.typed_of(pending.rig),
         in_formulas=mappings.in_formulas(document, channels),

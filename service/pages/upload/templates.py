@@ -6,8 +6,8 @@ from typing import Any
 
 import orjson
 
-from service.ingest.field_words import SKIN
 from service.ingest.instruments import template_of, with_skin
+from service.ingest.rig_words import SKIN
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import tares_of
 from service.pages.upload.pending_uploads import PendingUpload, Remembered
