@@ -24,19 +24,14 @@ from service.pages.upload.pending_uploads import PendingUploads
 from service.routes import (
     campaigns,
     changes,
-    design,
+    computed,
     diagnoses,
     exports,
-    field,
     health,
     mechanisms,
     models,
     openapi,
-    pressed_skin,
-    sigma,
     skins,
-    stress,
-    tables,
     umbridge,
 )
 from service.routes.query_guard import known_query
@@ -109,7 +104,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     # Each on its own: FastAPI prepares the routes of a router within a router once more.
     guards = [Security(authorised, scopes=["read"]), Depends(known_query)]
     of_skins = (campaigns, diagnoses, exports, skins, changes, models)
-    for noun in (sigma, pressed_skin, stress, field, design, tables, *of_skins, mechanisms):
+    for noun in (computed, *of_skins, mechanisms):
         api.include_router(noun.router, dependencies=guards)
     for router in (umbridge.router, health.router, openapi.router):
         api.include_router(router)
@@ -123,5 +118,5 @@ def _methods(api: FastAPI, path: str) -> list[str]:
 
 def create_app(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> ASGIApp:
     """What the server runs."""
-    hot = {("GET", "/v1/sigma"): sigma.hot_route(table), ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table)}
+    hot = {("GET", "/v1/sigma"): computed.hot_route(table), ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table)}
     return AsgiMiddleware(create_api(settings, table, access, store), access, hot, problem_page)
