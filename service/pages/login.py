@@ -9,9 +9,8 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.auth import session
 from service.auth.access_control import AccessControl
-from service.auth.client_address import client_address, network_of
 from service.auth.keys import Key
-from service.auth.login_throttle import LoginThrottle
+from service.auth.login_throttle import LoginThrottle, client_address, network_of
 from service.pages.shared.forms import FORM_OF_SESSION, Form, see
 from service.pages.shared.html import page, set_session
 from service.problems import Refusal
