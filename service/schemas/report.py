@@ -13,7 +13,6 @@ from underskin.findings.codes import FindingCode
 RecordingKind = Literal["frf", "indentation", "compression"]
 Verdict = Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
 Origin = Literal["skin", "rig", "chain"]
-RecordingKind = Literal["frf", "indentation", "compression"]
 
 
 class Parameter(BaseModel):

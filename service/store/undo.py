@@ -121,7 +121,7 @@ def _built_since(connection: Connection, change: AnyRow) -> str | None:
 
 def _built_on(connection: Connection, change: AnyRow, root: str) -> str | None:
     """What was built since on a skin and all that count as it, or on the changed campaign; times are in order of
-    creation (moments.py)."""
+    creation (times.py)."""
     numbers = numbers_of(root)
     of_skin = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
     if change.campaign_id is not None:
