@@ -76,6 +76,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
         redoc_url=None,
         openapi_url=None,
         lifespan=_lifespan,
+        generate_unique_id_function=lambda route: route.name,  # the functions are called as their operations
     )
     api.state.settings = settings
     api.state.document = openapi.document

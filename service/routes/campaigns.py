@@ -93,14 +93,13 @@ _BODY: dict[str, Any] = {
 
 @router.post(
     "/campaigns",
-    operation_id="post_campaigns",
     summary="Send campaigns",
     status_code=201,
     dependencies=WRITE,
     openapi_extra=_BODY,
     responses={201: {"model": models.CampaignResult | models.BatchResult}},
 )
-async def post(
+async def post_campaigns(
     request: Request,
     store: Store,
     table: Table,
@@ -160,15 +159,14 @@ def listed(
     return models.CampaignList(campaigns=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
 
-@router.get("/campaigns/{campaign_id}", operation_id="campaign", summary="One campaign")
-def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
+@router.get("/campaigns/{campaign_id}", summary="One campaign")
+def campaign(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
     """With its recordings, without their arrays."""
     return store.read(usecase.detail, campaign_id)
 
 
 @router.get(
     "/campaigns/{campaign_id}/document",
-    operation_id="campaign_document",
     summary="One campaign as campaign/1",
     response_class=Response,
     responses={
@@ -180,7 +178,7 @@ def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
         }
     },
 )
-def document(
+def campaign_document(
     campaign_id: CampaignId,
     request: Request,
     store: Store,
@@ -198,8 +196,8 @@ def document(
     )
 
 
-@router.get("/campaigns/{campaign_id}/d33", operation_id="campaign_d33", summary="d33 of each sensor")
-def d33(
+@router.get("/campaigns/{campaign_id}/d33", summary="d33 of each sensor")
+def campaign_d33(
     campaign_id: CampaignId,
     store: Store,
     table: Table,
@@ -219,10 +217,8 @@ def d33(
     return D33(**d33_cache.by_model(store, table, row, model, band))
 
 
-@router.post(
-    "/campaigns/{campaign_id}/withdraw", operation_id="withdraw_campaign", summary="Withdraw it", dependencies=WRITE
-)
-def withdraw(
+@router.post("/campaigns/{campaign_id}/withdraw", summary="Withdraw it", dependencies=WRITE)
+def withdraw_campaign(
     request: Request, campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Store
 ) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read."""
@@ -231,13 +227,8 @@ def withdraw(
         return usecase.detail(connection, campaign_id)
 
 
-@router.post(
-    "/campaigns/{campaign_id}/exclusions",
-    operation_id="exclude_recording",
-    summary="Exclude a recording",
-    dependencies=WRITE,
-)
-def exclude(
+@router.post("/campaigns/{campaign_id}/exclusions", summary="Exclude a recording", dependencies=WRITE)
+def exclude_recording(
     request: Request, campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table
 ) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read. A correction is the way back."""

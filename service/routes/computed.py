@@ -71,11 +71,7 @@ def hot_route(table: SigmaTable) -> HotRoute:
 
 
 @router.get(
-    "/sigma",
-    operation_id="sigma_one",
-    tags=["sigma"],
-    summary="σ at one point",
-    responses={200: {"model": OneSigma, "content": OTHER_ANSWERS}},
+    "/sigma", tags=["sigma"], summary="σ at one point", responses={200: {"model": OneSigma, "content": OTHER_ANSWERS}}
 )
 async def sigma_one(
     point: Annotated[SigmaQuery, Query()], table: Table, accept: Accept = "application/json"
@@ -91,7 +87,6 @@ add_columns_route(router, "/d33", "d33 from measured FRF", D33Columns, D33_EXAMP
 
 @router.post(
     "/stress",
-    operation_id="stress",
     tags=["stress"],
     summary="Charge on every sensor of an array",
     responses={200: {"model": StressAnswer, "content": OTHER_ANSWERS}},
@@ -107,13 +102,7 @@ async def stress(request: Request, accept: Accept = "application/json") -> Respo
     return await answer_json(request, answer)
 
 
-@router.get(
-    "/field",
-    operation_id="field",
-    tags=["field"],
-    summary="The stress under a sphere",
-    responses={200: {"model": FieldAnswer}},
-)
+@router.get("/field", tags=["field"], summary="The stress under a sphere", responses={200: {"model": FieldAnswer}})
 def field(query: Annotated[FieldQuery, Query()], table: Table) -> Response:
     """σ_zz in a section through the layer under a sphere; its last row is the base, where the sensors are.
 
@@ -125,7 +114,6 @@ def field(query: Annotated[FieldQuery, Query()], table: Table) -> Response:
 
 @router.post(
     "/design",
-    operation_id="design",
     tags=["design"],
     summary="A skin before it is built",
     responses={200: {"model": DesignAnswer}},
@@ -145,7 +133,7 @@ async def design(request: Request, table: Table) -> Response:
     return await answer_json(request, answer)
 
 
-@router.get("/tables", operation_id="tables", tags=["tables"], summary="The tables in use")
+@router.get("/tables", tags=["tables"], summary="The tables in use")
 async def tables(request: Request, table: Table) -> Tables:
     """The tables that answers are computed from: of σ, of influence, and of the solved contact."""
     return usecase.tables(table, request.app.state.settings.tables)

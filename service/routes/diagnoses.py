@@ -20,13 +20,12 @@ router = APIRouter(prefix="/v1", tags=["diagnoses"], route_class=JsonRoute)
 
 @router.post(
     "/campaigns/{campaign_id}/diagnosis",
-    operation_id="diagnose_campaign",
     summary="Ask for its diagnosis",
     status_code=202,
     dependencies=WRITE,
     responses={202: {"model": models.Asked}},
 )
-def ask(
+def diagnose_campaign(
     campaign_id: CampaignId,
     runner: RunnerInUse,
     idempotency: Idempotent,
@@ -47,13 +46,12 @@ def ask(
 
 @router.post(
     "/skins/{skin_id}/diagnosis",
-    operation_id="diagnose_skin",
     summary="Ask for a diagnosis of its campaigns together",
     status_code=202,
     dependencies=WRITE,
     responses={202: {"model": models.Asked}},
 )
-def ask_of_skin(
+def diagnose_skin(
     skin_id: SkinId,
     runner: RunnerInUse,
     idempotency: Idempotent,
@@ -74,13 +72,12 @@ def ask_of_skin(
 
 @router.post(
     "/fleets/diagnosis",
-    operation_id="diagnose_fleet",
     summary="Ask for a diagnosis of several skins together",
     status_code=202,
     dependencies=WRITE,
     responses={202: {"model": models.Asked}},
 )
-def ask_of_fleet(
+def diagnose_fleet(
     runner: RunnerInUse, idempotency: Idempotent, store: Store, table: Table, asked: models.AskForFleet
 ) -> JSONResponse:
     """Puts one diagnosis of all campaigns of these skins into the queue: what they have in common, and which skin
@@ -122,8 +119,8 @@ def listed(
     return models.DiagnosisList(diagnoses=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
 
-@router.get("/diagnoses/{diagnosis_id}", operation_id="diagnosis", summary="One diagnosis")
-def one(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
+@router.get("/diagnoses/{diagnosis_id}", summary="One diagnosis")
+def diagnosis(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
     """How far it is and, once it is done, its report."""
     with store.reading() as connection:
         row = diagnoses.find(connection, diagnosis_id)
@@ -131,10 +128,8 @@ def one(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
         return models.Diagnosis(**usecase.entry(connection, row), report=report)
 
 
-@router.delete(
-    "/diagnoses/{diagnosis_id}", operation_id="cancel_diagnosis", summary="Cancel a diagnosis", dependencies=WRITE
-)
-def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> models.DiagnosisEntry:
+@router.delete("/diagnoses/{diagnosis_id}", summary="Cancel a diagnosis", dependencies=WRITE)
+def cancel_diagnosis(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> models.DiagnosisEntry:
     """Ends its process, or takes it out of the queue. One that is done or has failed stays: 409."""
     with store.writing() as connection:
         diagnoses.cancel(connection, diagnosis_id)

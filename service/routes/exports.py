@@ -25,11 +25,7 @@ _FILE: dict[str, Any] = {"content": {_MEDIA_TYPE: {"schema": {"type": "string", 
 
 
 @router.get(
-    "/skins/{skin_id}/export",
-    operation_id="export_skin",
-    summary="All that is kept of a skin",
-    response_class=MadeFile,
-    responses={200: _FILE},
+    "/skins/{skin_id}/export", summary="All that is kept of a skin", response_class=MadeFile, responses={200: _FILE}
 )
 async def export_skin(skin_id: SkinId, request: Request, store: Store) -> Response:
     """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, its rigs,
@@ -47,7 +43,6 @@ def _exported(store: Database, request: Request, skin_id: str) -> Response:
 
 @router.post(
     "/skins/import",
-    operation_id="import_skin",
     summary="Bring in a skin that was exported",
     dependencies=WRITE,
     openapi_extra={

@@ -33,13 +33,13 @@ class Ready(BaseModel):
     table_sha256: str = Field(description="SHA-256 of the σ table.")
 
 
-@router.get("/health", operation_id="health", tags=["health"], summary="Is the process alive?")
+@router.get("/health", tags=["health"], summary="Is the process alive?")
 async def health() -> Health:
     """For a container's health check."""
     return Health(status="ok")
 
 
-@router.get("/ready", operation_id="ready", tags=["health"], summary="Can it do its work?")
+@router.get("/ready", tags=["health"], summary="Can it do its work?")
 def ready(request: Request, table: Table, store: Store) -> Ready:
     """Table loaded, data folder writable, the store answering and its files those on the disk; 503 where not."""
     folder = request.app.state.settings.data
@@ -68,7 +68,6 @@ def watch_disk(folder: Path) -> None:
 
 @router.get(
     "/metrics",
-    operation_id="metrics",
     tags=["metrics"],
     summary="Metrics for Prometheus",
     response_class=Response,

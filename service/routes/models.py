@@ -20,13 +20,12 @@ router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
 
 @router.post(
     "/skins/{skin_id}/model",
-    operation_id="adopt_model",
     summary="Adopt a model",
     status_code=201,
     dependencies=WRITE,
     responses={201: {"model": answers.ModelEntry}},
 )
-def adopt(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempotent, store: Store) -> JSONResponse:
+def adopt_model(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempotent, store: Store) -> JSONResponse:
     """Makes an explained diagnosis the skin's model: `/v1/frf`, `/v1/d33`, the d33 of campaigns and the history serve
     it on request from now on. Adopted already, it is answered as it is."""
 
@@ -38,10 +37,8 @@ def adopt(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempotent, 
     return JSONResponse(idempotency.answer(store, adoption.diagnosis_id, act), status_code=201)
 
 
-@router.delete(
-    "/skins/{skin_id}/model", operation_id="withdraw_model", summary="Withdraw the model in force", dependencies=WRITE
-)
-def withdraw(
+@router.delete("/skins/{skin_id}/model", summary="Withdraw the model in force", dependencies=WRITE)
+def withdraw_model(
     skin_id: SkinId,
     reason: Annotated[ReasonText, Query(description="Why; kept with it.")],
     idempotency: Idempotent,
@@ -57,8 +54,8 @@ def withdraw(
     return answers.ModelVersion(**idempotency.answer(store, {"withdraw": reason}, act))
 
 
-@router.get("/skins/{skin_id}/model", operation_id="skin_model", summary="The model in force")
-def in_force(skin_id: SkinId, store: Store) -> answers.ModelEntry:
+@router.get("/skins/{skin_id}/model", summary="The model in force")
+def skin_model(skin_id: SkinId, store: Store) -> answers.ModelEntry:
     """With the campaign and the evidence that it comes from; 404 where there is none."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
@@ -68,8 +65,8 @@ def in_force(skin_id: SkinId, store: Store) -> answers.ModelEntry:
         return usecase.entry(connection, row)
 
 
-@router.get("/skins/{skin_id}/model/versions", operation_id="skin_model_versions", summary="All models it ever had")
-def versions(skin_id: SkinId, store: Store) -> answers.ModelVersions:
+@router.get("/skins/{skin_id}/model/versions", summary="All models it ever had")
+def skin_model_versions(skin_id: SkinId, store: Store) -> answers.ModelVersions:
     """Nothing is deleted: of the skin and of those joined to it."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)

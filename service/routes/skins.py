@@ -27,21 +27,21 @@ def listed(
     return models.SkinList(skins=page, next=rows[limit - 1].id if len(rows) > limit else None)
 
 
-@router.get("/skins/{skin_id}", operation_id="skin", summary="One skin")
-def one(skin_id: SkinId, store: Store) -> models.SkinDetail:
+@router.get("/skins/{skin_id}", summary="One skin")
+def skin(skin_id: SkinId, store: Store) -> models.SkinDetail:
     """With what was joined to it; of a joined skin, the one that it counts as."""
     return store.read(usecase.detail, skin_id)
 
 
-@router.post("/skins/{skin_id}/join", operation_id="join_skins", summary="Join another skin to it", dependencies=WRITE)
-def join(request: Request, skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
+@router.post("/skins/{skin_id}/join", summary="Join another skin to it", dependencies=WRITE)
+def join_skins(request: Request, skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
     """Two ids turned out to mean one skin: from now on figures of this one use the campaigns of both."""
     usecase.join(store, skin_id, join.skin_id, join.reason, sender(request))
     return store.read(usecase.detail, skin_id)
 
 
-@router.get("/skins/{skin_id}/history", operation_id="skin_history", summary="d33 over time")
-def history(
+@router.get("/skins/{skin_id}/history", summary="d33 over time")
+def skin_history(
     skin_id: SkinId,
     store: Store,
     table: Table,
