@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any
 
-from fastapi import Depends, Path, Request, Security
+from fastapi import Depends, Path, Query, Request, Security
 from fastapi.security import SecurityScopes
 
 from service.auth.access_control import SAFE
@@ -44,6 +44,8 @@ Store = Annotated[Database, Depends(_store)]
 CampaignId = Annotated[str, Path(description="Id of a campaign, as it was answered when it was sent.")]
 DiagnosisId = Annotated[str, Path(description="Id of a diagnosis, as it was answered when it was asked for.")]
 SkinId = Annotated[str, Path(description="Id of a skin.")]
+Limit = Annotated[int, Query(ge=1, le=200, description="How many on a page.")]
+Cursor = Annotated[str | None, Query(description="`next` of the page before.")]
 
 
 def authorised(scopes: SecurityScopes, request: Request) -> None:

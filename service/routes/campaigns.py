@@ -4,15 +4,16 @@ from functools import partial
 from typing import Annotated, Any, Literal
 
 import orjson
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import WRITE, CampaignId, Store, Table, number_of_cursor, sender
+from service.dependencies import WRITE, CampaignId, Cursor, Limit, Store, Table, number_of_cursor, sender
 from service.ingest.accept import RIG, IngestOptions, accept
 from service.ingest.reading import keeping
 from service.ingest.uploads import FILE, received, split
 from service.middleware.json_bodies import JsonRoute
+from service.routes.idempotency import IdempotencyKey
 from service.routes.temporary_files import made_file
 from service.schemas import campaigns as models
 from service.schemas.campaign_d33 import D33
@@ -104,14 +105,7 @@ async def post_campaigns(
     store: Store,
     table: Table,
     query: Annotated[models.SendOptions, Query()],
-    idempotency_key: Annotated[
-        str | None,
-        Header(
-            min_length=1,
-            max_length=255,
-            description="A text of your own: the same request under the same key is answered the same and kept once.",
-        ),
-    ] = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Keeps the good recordings and says of each of the others what was wrong. What is answered is on the disk.
 
@@ -143,8 +137,8 @@ def listed(
     name_contains: Annotated[str | None, Query(description="Only those whose name contains this.")] = None,
     recorded_from: Annotated[str | None, Query(description="Only those recorded at this time or later.")] = None,
     recorded_to: Annotated[str | None, Query(description="Only those recorded before this time.")] = None,
-    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
-    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
 ) -> models.CampaignList:
     """Without their recordings; a page holds `limit` of them."""
     filters = campaigns.CampaignFilters(

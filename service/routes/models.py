@@ -25,24 +25,21 @@ router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
     dependencies=WRITE,
     responses={201: {"model": answers.ModelEntry}},
 )
-def adopt_model(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempotent, store: Store) -> JSONResponse:
+def adopt_model(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempotent) -> JSONResponse:
     """Makes an explained diagnosis the skin's model: `/v1/frf`, `/v1/d33`, the d33 of campaigns and the history serve
     it on request from now on. Adopted already, it is answered as it is."""
 
     def act(connection: Connection) -> dict[str, object]:
-        return usecase.entry(
-            connection, usecase.adopt(connection, skin_id, adoption.diagnosis_id, idempotency.sender)
-        ).model_dump()
+        adopted = usecase.adopt(connection, skin_id, adoption.diagnosis_id, idempotency.sender)
+        return usecase.entry(connection, adopted).model_dump()
 
-    return JSONResponse(idempotency.answer(store, adoption.diagnosis_id, act), status_code=201)
+    # As it was kept: an earlier version may have answered with other fields.
+    return JSONResponse(idempotency.answer(adoption.diagnosis_id, act), status_code=201)
 
 
 @router.delete("/skins/{skin_id}/model", summary="Withdraw the model in force", dependencies=WRITE)
 def withdraw_model(
-    skin_id: SkinId,
-    reason: Annotated[ReasonText, Query(description="Why; kept with it.")],
-    idempotency: Idempotent,
-    store: Store,
+    skin_id: SkinId, reason: Annotated[ReasonText, Query(description="Why; kept with it.")], idempotency: Idempotent
 ) -> answers.ModelVersion:
     """Has no model in force, as before the first adoption: the paper's model serves. Nothing is deleted: the version
     stays, and says when, by whom and why it was withdrawn; 404 where none was in force."""
@@ -51,7 +48,7 @@ def withdraw_model(
         root = skins.require_root(connection, skin_id)
         return usecase.version(models.withdraw(connection, root, reason, idempotency.sender)).model_dump()
 
-    return answers.ModelVersion(**idempotency.answer(store, {"withdraw": reason}, act))
+    return answers.ModelVersion(**idempotency.answer({"withdraw": reason}, act))
 
 
 @router.get("/skins/{skin_id}/model", summary="The model in force")

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request
 
-from service.dependencies import WRITE, SkinId, Store, Table, sender
+from service.dependencies import WRITE, Cursor, Limit, SkinId, Store, Table, sender
 from service.middleware.json_bodies import JsonRoute
 from service.schemas import skins as models
 from service.store import skins
@@ -18,8 +18,8 @@ router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
 def listed(
     store: Store,
     id_contains: Annotated[str | None, Query(description="Only those whose id contains this.")] = None,
-    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
-    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
 ) -> models.SkinList:
     """Those joined to another are under that one."""
     rows = store.read(skins.listed, id_contains, cursor, limit + 1)
