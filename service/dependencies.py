@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from fastapi import Depends, Path, Query, Request, Security
 from fastapi.security import SecurityScopes
 
-from service.auth.access_control import SAFE
+from service.auth.access_control import SAFE, AccessControl
 from service.auth.keys import Key
 from service.jobs.planner import Planner
 from service.jobs.runner import Runner
@@ -28,6 +28,7 @@ def _of_app(name: str) -> Callable[[Request], Awaitable[Any]]:
 Table = Annotated[SigmaTable, Depends(_of_app("table"))]
 RunnerInUse = Annotated[Runner, Depends(_of_app("runner"))]
 PlannerInUse = Annotated[Planner, Depends(_of_app("planner"))]
+Access = Annotated[AccessControl, Depends(_of_app("access"))]
 # For routes that keep nothing, whatever their method.
 StoreToRead = Annotated[Database, Depends(_of_app("store"))]
 

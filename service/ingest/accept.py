@@ -15,6 +15,7 @@ from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joine
 from service.ingest.rig_words import rig_sentences
 from service.ingest.uploads import Upload
 from service.problems import Refusal
+from service.settings import Settings
 from service.store import Database, answers, campaigns, instrument_templates, skins
 from underskin.errors import FileError, InvalidInput, SeveralInvalid, conflicting, errors_of, required
 from underskin.findings.formatting import grouped_by_reason, recordings_called, why_refused
@@ -67,15 +68,14 @@ def _arrays(campaigns: Iterable[ReadCampaign]) -> Iterator[NDArray[np.generic]]:
 class IngestOptions:
     """Options of an upload request."""
 
-    skin: str | None
-    corrects: str | None
-    reason: str | None
-    all_or_nothing: bool
-    together: str | None
-    idempotency_key: str | None
+    settings: Settings
     sender: str | None
-    most_json_bytes: int
-    most_unfolded_bytes: int
+    skin: str | None = None
+    corrects: str | None = None
+    reason: str | None = None
+    all_or_nothing: bool = False
+    together: str | None = None
+    idempotency_key: str | None = None
     estimator: Estimator | None = None
     turn_curves: bool = False  # that count pressing negative
     use_stored_rig: bool = True  # whether the stored rig description of the skin is used if none is sent
@@ -163,10 +163,10 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
     """The campaigns of all files; a single one if the files belong together."""
     files: list[ReadCampaign] = []
     recordings = 0
-    held = HeldArrays(options.most_unfolded_bytes)
+    held = HeldArrays(options.settings.max_unfolded_bytes)
     for upload in uploads:
         if upload.field != RIG:
-            more = look(upload, rig, options.most_json_bytes, uploads).campaigns
+            more = look(upload, rig, options.settings.max_body_bytes, uploads).campaigns
             more = [file.with_curves_turned() for file in more] if options.turn_curves else more
             files += [file.with_estimator(options.estimator) for file in more]
             held.add(more)

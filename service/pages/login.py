@@ -8,9 +8,9 @@ from urllib.parse import quote
 from fastapi import APIRouter, Query, Request, Response
 
 from service.auth import session
-from service.auth.access_control import AccessControl
 from service.auth.keys import Key
 from service.auth.login_throttle import LoginThrottle, client_address, network_of
+from service.dependencies import Access
 from service.pages.shared.forms import FORM_OF_SESSION, Form, see
 from service.pages.shared.html import page, set_session
 from service.problems import Refusal
@@ -37,18 +37,18 @@ _SYSTEMS = {
 
 
 @router.get("/login")
-def form(request: Request, back: Annotated[str, Query(alias="next")] = "/", unsent: bool = False) -> Response:
+def form(
+    request: Request, access: Access, back: Annotated[str, Query(alias="next")] = "/", unsent: bool = False
+) -> Response:
     """Asks for a key, where one is needed; `unsent`: a form came without a session, and was not taken."""
-    access: AccessControl = request.app.state.access
     if not access.keys_needed():
         return see("/")
     return page(request, "login.html", back=back, unsent=unsent, refused=False, missing=access.keys_missing())
 
 
 @router.post("/login")
-def login(request: Request, sent: Form) -> Response:
+def login(request: Request, access: Access, sent: Form) -> Response:
     """Starts a session."""
-    access: AccessControl = request.app.state.access
     throttle: LoginThrottle = request.app.state.login_throttle
     address = client_address(request, request.app.state.proxies)
     wait_s = throttle.begin(network_of(address))
@@ -69,12 +69,11 @@ def login(request: Request, sent: Form) -> Response:
 
 
 @router.post("/logout", dependencies=[FORM_OF_SESSION])
-def logout(request: Request) -> Response:
+def logout(request: Request, access: Access) -> Response:
     """Ends it, for whoever has a copy of its cookie too."""
     key: Key | None = request.scope["key"]
     if key is not None:
-        access: AccessControl = request.app.state.access
-        access.sessions.log_out(session.cookie_in(dict(request.scope["headers"])), key)
+        access.sessions.log_out(session.cookie_of(request), key)
     answer = see("/login")
     set_session(request, answer, session.anonymous())
     return answer
@@ -87,21 +86,19 @@ def _local_path(path: str) -> str:
 
 
 @router.get("/sessions")
-def sessions(request: Request) -> Response:
+def sessions(request: Request, access: Access) -> Response:
     """Those that go on, the latest first."""
     key: Key | None = request.scope["key"]
-    access: AccessControl = request.app.state.access
-    this = session.id_of(session.cookie_in(dict(request.scope["headers"])))
+    this = session.id_of(session.cookie_of(request))
     listed = [] if key is None else access.sessions.listed(key)
     return page(request, "sessions.html", sessions=listed, this=this, browser_name=browser_name)
 
 
 @router.post("/sessions/{session_id}/end", dependencies=[FORM_OF_SESSION])
-def end(session_id: str, request: Request) -> Response:
+def end(session_id: str, request: Request, access: Access) -> Response:
     """End one of them; raises Missing where it is none of this key's."""
     key: Key | None = request.scope["key"]
     if key is not None:
-        access: AccessControl = request.app.state.access
         access.sessions.end(session_id, key)
     return see("/sessions")
 

@@ -77,9 +77,7 @@ async def load(request: Request, store: Store, table: Table) -> Response:
         return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
     request_text = f"the example skin, {withdrawn} withdrawn" if withdrawn else "the example skin"
-    settings = request.app.state.settings
-    most = settings.max_body_bytes, settings.max_unfolded_bytes
-    options = IngestOptions(SKIN, None, None, False, None, request_text, sender(request), *most)
+    options = IngestOptions(request.app.state.settings, sender(request), skin=SKIN, idempotency_key=request_text)
     answer, _ = await run_in_threadpool(accept, store, uploads, options)
     await run_in_threadpool(d33_cache.derive, store, table, [campaign["id"] for campaign in answer["campaigns"]])
     return see(f"/skins/{SKIN}")

@@ -116,11 +116,7 @@ async def post_campaigns(
     async with received(request, folder) as parts, keeping(store):
         fields, uploads = await folder.threads.run(partial(split, parts, list(models.SendOptions.model_fields), [RIG]))
         options = IngestOptions(
-            **query.with_form(fields).model_dump(),
-            idempotency_key=idempotency_key,
-            sender=sender(request),
-            most_json_bytes=settings.max_body_bytes,
-            most_unfolded_bytes=settings.max_unfolded_bytes,
+            settings, sender(request), idempotency_key=idempotency_key, **query.with_form(fields).model_dump()
         )
         answer, repeats = await run_in_threadpool(accept, store, uploads, options)
         campaign_ids = [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]

@@ -75,7 +75,7 @@ async def _fields(request: Request) -> dict[str, str]:
 
 def require_form_token(request: Request, token: str) -> None:
     """Rejects a form that was not sent from a page of this session."""
-    if not session.is_form_token(session.cookie_in(dict(request.scope["headers"])), token):
+    if not session.is_form_token(session.cookie_of(request), token):
         raise Refusal(403, "This form was not made for your session, or the session has ended: go back and reload it.")
 
 

@@ -86,7 +86,7 @@ def page(
     request: Request, template: str, *, status: int = 200, cookie: str | None = None, **values: Any
 ) -> HTMLResponse:
     """A template as the answer to a request; `cookie` replaces the session's."""
-    cookie_sent = session.cookie_in(dict(request.scope["headers"]))
+    cookie_sent = session.cookie_of(request)
     current = cookie or cookie_sent or session.anonymous()
     key: Key | None = request.scope["key"]
     viewer = {

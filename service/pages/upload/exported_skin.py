@@ -13,7 +13,7 @@ from service.pages.shared import same_request
 from service.pages.shared.html import page
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.looking import field_errors
-from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
+from service.pages.upload.pending_uploads import PendingUpload
 from service.store import Conflict, Database
 from underskin import InvalidInput
 from underskin.recordings.skin_export import is_export
@@ -114,17 +114,16 @@ def shown(request: Request, pending: PendingUpload) -> Response:
     )
 
 
-def bring_in(request: Request, store: Database, pending: PendingUpload) -> None:
+def bring_in(store: Database, pending: PendingUpload) -> None:
     """Keep what is not here; errors are shown on the upload's page. A second request stores nothing again."""
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
     with pending.lock:
         if pending.kept_at is not None:
             return
-        with pending_uploads.in_use(pending):
+        with pending.shelf.in_use(pending):
             try:
                 brought = skin_imports.bring_in(store, pending.files[0])
             except Conflict:  # the stored data were changed since it was examined
                 look(store, pending)
                 return
         pending.kept_at = f"/skins/{quote(brought.skin_id, safe='')}"
-        pending_uploads.empty(pending)
+        pending.shelf.empty(pending)

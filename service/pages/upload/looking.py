@@ -20,7 +20,7 @@ from service.pages.shared.forms import signed
 from service.pages.upload.figures import course, figures, with_curves_turned
 from service.pages.upload.file_summary import ChannelSummary, FileSummary, RecordingSummary, doubts, listed, seen
 from service.pages.upload.mapping import CHOICES, mapped_file
-from service.pages.upload.pending_uploads import PendingUpload, PendingUploads, Remembered
+from service.pages.upload.pending_uploads import PendingUpload, Remembered
 from service.problems import Refusal
 from service.store import Conflict, Database, Missing, campaigns, skins
 from service.usecases import d33_cache
@@ -36,7 +36,6 @@ _WORKBOOK, _OF_TEXT = "XLSX", ", separated by tabs, with decimal points"
 def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str], store: Database) -> list[str]:
     """Store the valid campaigns; returns their ids. Errors are shown on the upload's page. A second request stores
     nothing again."""
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
     with pending.lock:
         if pending.kept_at is not None or pending.is_stale:  # of which the page shows no button to keep it
             return []
@@ -45,24 +44,20 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
         pending.reason = sent.get("reason", "").strip()
         pending.who = sent.get("who", "").strip()
         reason = pending.reason or None if pending.corrects is not None else None
-        settings = request.app.state.settings
         try:
             options = IngestOptions(
-                pending.skin,
-                pending.corrects,
-                reason,
-                False,
-                together,
-                None,
+                request.app.state.settings,
                 sender(request),
-                settings.max_body_bytes,
-                settings.max_unfolded_bytes,
-                pending.estimator,
+                skin=pending.skin,
+                corrects=pending.corrects,
+                reason=reason,
+                together=together,
+                estimator=pending.estimator,
                 turn_curves=pending.turned,
                 use_stored_rig=False,  # exactly the previewed data are stored
                 signed=signed(request, sent) if pending.corrects is not None else None,
             )
-            with pending_uploads.in_use(pending):
+            with pending.shelf.in_use(pending):
                 answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
         except (InvalidInput, Conflict, Missing, Refusal) as error:
             pending.refused = field_errors(error)
@@ -70,7 +65,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
         stored = [result for result in answer["campaigns"] if result["id"] is not None]
         page = f"/campaigns/{stored[0]['id']}"
         pending.kept_at = page if len(stored) == 1 else f"/skins/{quote(stored[0]['skin_id'], safe='')}"
-        pending_uploads.empty(pending)
+        pending.shelf.empty(pending)
         return [result["id"] for result in stored]
 
 
@@ -166,8 +161,7 @@ def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFi
     """One file, read; raises Missing if there is none of that number any more."""
     if not 0 <= number < len(pending.files) or pending.kept_at is not None:
         raise Missing("There is no such file in this upload.")
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    with pending_uploads.in_use(pending):
+    with pending.shelf.in_use(pending):
         most_bytes = request.app.state.settings.max_body_bytes
         inspected = look(pending.files[number], pending.rig, most_bytes, pending.files)
     campaigns = [campaign.with_estimator(pending.estimator) for campaign in inspected.campaigns]

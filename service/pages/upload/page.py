@@ -70,13 +70,13 @@ def form(
 def _form(request: Request, store: Database, skin: str, corrects: str, error: str | None = None) -> Response:
     skin_ids = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     corrected = store.read(campaigns.find, corrects) if corrects else None
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    cookie = session.cookie_in(dict(request.scope["headers"]))
+    held: PendingUploads = request.app.state.pending_uploads
+    cookie = session.cookie_of(request)
     return page(
         request,
         "upload.html",
-        waiting=pending_uploads.waiting(cookie),
-        discarded=pending_uploads.discarded(cookie),
+        waiting=held.waiting(cookie),
+        discarded=held.discarded(cookie),
         status=200 if error is None else 422,
         error=error,
         skin=skin,
@@ -91,8 +91,7 @@ def _form(request: Request, store: Database, skin: str, corrects: str, error: st
 @router.post("", dependencies=WRITE)
 async def send(request: Request, store: Store) -> Response:
     """Receives files for preview; nothing is stored."""
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    cookie = session.cookie_in(dict(request.scope["headers"]))
+    held: PendingUploads = request.app.state.pending_uploads
     folder: UploadFolder = request.app.state.uploads
     async with received(request, folder) as sent:
         unlabelled = [part for part in sent if part.label is None]
@@ -108,18 +107,18 @@ async def send(request: Request, store: Store) -> Response:
         estimator_typed = fields.get(_ESTIMATOR)
         estimator = checked_estimator(_ESTIMATOR, estimator_typed) if estimator_typed else None
         skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
-        pending = await folder.threads.run(partial(pending_uploads.put, cookie, given))
+        pending = await folder.threads.run(partial(held.put, session.cookie_of(request), given))
         pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
         await in_turn(take_rig, store, pending, rig)
     try:
-        with pending_uploads.in_use(pending):
+        with held.in_use(pending):
             if await run_in_threadpool(exported_skin.holds_skin, pending):
                 async with skin_imports.one_at_a_time:
                     await run_in_threadpool(exported_skin.look, store, pending)
             else:
                 await in_turn(look_at_all, request, pending)
     except BaseException:
-        pending_uploads.remove(pending)
+        held.remove(pending)
         raise
     return see(f"/upload/{pending.id}")
 
@@ -282,13 +281,13 @@ async def keep(request: Request, sent: Form, pending: Pending, store: Store, tab
 
 
 @router.post("/{upload_id}/skin", dependencies=[*WRITE, FORM_OF_SESSION])
-async def bring_in(request: Request, pending: Pending, store: Store) -> Response:
+async def bring_in(pending: Pending, store: Store) -> Response:
     """Imports an exported skin."""
     if pending.skin_summary is None:
         raise Missing("There is no exported skin in this upload.")
     async with skin_imports.one_at_a_time:
         store.require_hope()
-        await run_in_threadpool(exported_skin.bring_in, request, store, pending)
+        await run_in_threadpool(exported_skin.bring_in, store, pending)
     return see(pending.kept_at or f"/upload/{pending.id}")
 
 

@@ -61,6 +61,7 @@ class PendingUpload:
     files: Sequence[Upload]
     size: int
     used: float
+    shelf: "PendingUploads"  # which holds it
     skin: str | None = None
     rig: RigDescription | None = None
     rig_label: str | None = None  # the file that a request would send it as; None where none need be sent
@@ -133,7 +134,7 @@ class PendingUploads:
         folder.mkdir()
         files = [replace(file, path=file.path.rename(folder / str(number))) for number, file in enumerate(sent)]
         size = sum(file.path.stat().st_size for file in files)
-        added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic())
+        added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic(), self)
         with self._lock:
             gone = self._of_session(added.session)[_MOST_OF_SESSION - 1 :]
             for old in gone:
@@ -235,8 +236,8 @@ def _digest(cookie: str) -> str:
 
 def _upload(request: Request, upload_id: str) -> PendingUpload:
     """The upload of an address; raises Missing if it is not the session's own."""
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
+    held: PendingUploads = request.app.state.pending_uploads
+    return held.find(session.cookie_of(request), upload_id)
 
 
 UploadOfSession = Annotated[PendingUpload, Depends(_upload)]
