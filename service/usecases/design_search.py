@@ -20,12 +20,12 @@ import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
-from service.usecases.tables import requested_contact
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.prediction.skin_design import are_resolved, resolution
 from underskin.surrogate.off_centre_sigma import sigma_off_centre
 from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
+from underskin.surrogate.solved_contact import contact_model
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 _PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
@@ -123,29 +123,29 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     force = float(checked("preload_n", demand.preload_n))
     d33 = float(checked("d33_pc_per_n", demand.d33_pc_per_n))
     any_skin = Skin.from_lab(thickness_mm=1.0, youngs_modulus_mpa=demand.youngs_modulus_mpa, sensor_radius_mm=1.0)
-    contact_model = requested_contact(table, _CONTACT)
-    thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * _thinnest_mm(contact_model, any_skin, indenter, force)))
+    used = contact_model(table, _CONTACT)
+    thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * _thinnest_mm(used, any_skin, indenter, force)))
     thickness = _steps(thinnest, max(demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
     radii = _steps(RADIUS_MM[0], max(0.28 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
     h, radius = np.meshgrid(to_si("thickness_mm", thickness), to_si("sensor_radius_mm", radii))
     skin = Skin(h, any_skin.youngs_modulus, radius, any_skin.poisson_ratio)
-    reached = transmission(contact_model, skin, indenter, force)
+    reached = transmission(used, skin, indenter, force)
     contact = to_lab("contact_radius_mm", reached.contact_radius[0])
     numbers = reached.small_strain_a_over_h, reached.rt_over_h, reached.load_parameter
     apart = (2 * contact <= demand.resolution_mm) & (4 * radii[:, None] <= demand.resolution_mm)
     pitch = np.full(h.shape, np.nan)
     for index in zip(*np.nonzero(reached.inside & apart), strict=True):
-        offset, response = sigma_off_centre(contact_model, *(float(part[index]) for part in numbers))
+        offset, response = sigma_off_centre(used, *(float(part[index]) for part in numbers))
         if np.isfinite(response).all():
             finest, touching = 2 * float(radii[index[0]]), float(contact[index[1]])
             pitch[index] = _largest_pitch_mm(offset * float(h[index]), response, finest, touching, demand)
     return Region(contact, thickness, radii, pitch, np.asarray(to_lab("frf_pc_per_n", reached.frf(d33))))
 
 
-def _thinnest_mm(contact_model: ContactModel, skin: Skin, indenter: Indenter, force: float) -> float:
+def _thinnest_mm(contact: ContactModel, skin: Skin, indenter: Indenter, force: float) -> float:
     """The thickness at which a/h is the largest of the table."""
-    most = np.array(contact_model.domain["a_over_h"][1])
-    over_cube, _ = contact_model.load_over_cube(most)
+    most = np.array(contact.domain["a_over_h"][1])
+    over_cube, _ = contact.load_over_cube(most)
     plane_modulus = skin.youngs_modulus / (1 - skin.poisson_ratio**2)
     return float(to_lab("thickness_mm", np.cbrt(force * indenter.radius / (plane_modulus * over_cube * most**3))))
 

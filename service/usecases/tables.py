@@ -1,21 +1,18 @@
 """The tables in use (domain and origin of each; those other than σ's are read when a request first needs them), and
 the answers that are read from them: σ, the stress under a sphere, the charge of an array."""
 
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from service.problems import Refusal
 from service.schemas.columns import Columns
 from service.schemas.field import FieldAnswer, FieldQuery
 from service.schemas.sigma import SigmaColumns
 from service.schemas.tables import TableAxis, TableEntry, Tables
 from underskin.array_stress.answer import answer
 from underskin.array_stress.request import LoadCase
-from underskin.errors import TableError
 from underskin.physics.charge_response import INCOMPRESSIBLE
 from underskin.prediction import answers
 from underskin.prediction.answers import lab_columns
@@ -23,40 +20,24 @@ from underskin.prediction.columns import rows
 from underskin.prediction.stress_field import field_from_lab
 from underskin.surrogate.hdf5_format import CONTACT_TABLE, ContactTable, load_contact
 from underskin.surrogate.influence_table import INFLUENCE_TABLE, InfluenceTable, load_influence
-from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.surrogate.solved_contact import contact_model
 from underskin.units import to_lab
 
-_Table = TypeVar("_Table")
 _NAMED = {"schema", "data_sha256", "default"}
 _OPTIONS = {"contact", "r_points", "depth_points", "units_checked"}
 
 
 @cache
 def influence_table(folder: Path) -> InfluenceTable:
-    """γ_n and γ_t; raises Refusal 503 with the reason when the table cannot be read."""
-    return _read(load_influence, folder / INFLUENCE_TABLE)
+    """γ_n and γ_t; raises TableError."""
+    return load_influence(folder / INFLUENCE_TABLE)
 
 
 @cache
 def _contact_table(folder: Path) -> ContactTable:
-    """The finite-strain contact; raises Refusal 503 with the reason when the table cannot be read."""
-    return _read(load_contact, folder / CONTACT_TABLE)
-
-
-def requested_contact(table: SigmaTable, name: ContactName) -> ContactModel:
-    """The contact of this name; raises Refusal 503 with the reason when its table cannot be read."""
-    try:
-        return contact_model(table, name)
-    except TableError as error:
-        raise Refusal(503, str(error)) from error
-
-
-def _read(load: Callable[[Path], _Table], file: Path) -> _Table:
-    try:
-        return load(file)
-    except TableError as error:
-        raise Refusal(503, str(error)) from error
+    """The finite-strain contact; raises TableError."""
+    return load_contact(folder / CONTACT_TABLE)
 
 
 def tables(sigma_table: SigmaTable, folder: Path) -> Tables:
@@ -92,10 +73,7 @@ def sigma(table: SigmaTable, _: object, request: SigmaColumns) -> Columns:
 
 def stress(table: InfluenceTable, request: LoadCase) -> Columns:
     """Charge and stress on each sensor."""
-    try:
-        result = answer(table, request)
-    except TableError as error:
-        raise Refusal(503, str(error)) from error
+    result = answer(table, request)
     return Columns(
         rows=len(result.sensors),
         model="linear_layer",
@@ -116,7 +94,7 @@ def stress(table: InfluenceTable, request: LoadCase) -> Columns:
 def field_answer(table: SigmaTable, query: FieldQuery) -> FieldAnswer:
     """The stress that is asked for; raises InvalidInput."""
     values = query.model_dump(exclude=_OPTIONS)
-    contact = requested_contact(table, query.contact)
+    contact = contact_model(table, query.contact)
     field = field_from_lab(contact, values, query.r_points, query.depth_points, units_checked=query.units_checked)
     inside, tabulated = bool(field.contact.inside[0]), query.poisson_ratio == INCOMPRESSIBLE
     return FieldAnswer(
