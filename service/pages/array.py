@@ -52,6 +52,9 @@ from underskin.recordings.validation import check_fields, not_negative
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
+router = APIRouter(prefix="/loads")
+
+
 _MOST_SENSORS = 10_000
 
 # The L up to which the addition by finite strain is known, and that addition in percent (docs/http-api.md).
@@ -66,7 +69,6 @@ _LABELS = {
     "contacts": "loads",
     "pressure_map": "the map",
 }
-router = APIRouter(prefix="/loads")
 _LONGEST = 20_000  # characters of the loads
 _LOADS = "10 8 4 1\n14 16 10 3 0.5 0"
 _MOST_DRAWN = 6  # loads, of which the stress on the base is drawn

@@ -24,6 +24,9 @@ from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
+router = APIRouter(prefix="/campaigns/{campaign_id}")
+
+
 _AGAINST_PRELOAD = (
     "indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n", "model_frf_pc_per_n",
 )  # fmt: skip
@@ -32,7 +35,6 @@ _MOST_CACHED = 64
 Which = tuple[str, int, str, str, str]  # campaign, revision, table, band, shown part
 _cache: dict[Which, list[Drawn]] = {}
 _keeping = Lock()
-router = APIRouter(prefix="/campaigns/{campaign_id}")
 _MOST_LISTED = 60  # recordings on a page of the list
 _MOST_OFFERED = 1000  # recordings, to be excluded
 _MOST_DIAGNOSES = 5

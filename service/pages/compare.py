@@ -22,18 +22,13 @@ from underskin.inversion.comparison import in_words, with_differences
 from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable
 
-_MODULUS_COLUMNS = (
-    "which",
-    "campaign",
-    "recording",
-    "youngs_modulus_mpa",
-    "youngs_modulus_uncertainty_mpa",
-    "statement",
-)
+router = APIRouter(prefix="/compare")
+
+
+_OF_CURVES = ("which", "campaign", "recording", "youngs_modulus_mpa", "youngs_modulus_uncertainty_mpa", "statement")
 _MOST_CURVES = 12  # of each campaign
 _NAMES = ("first", "second")
 _MODULUS = "youngs_modulus_mpa"
-router = APIRouter(prefix="/compare")
 _MOST_LISTED = 200
 _MOST_NAMED = 6  # sensors
 _SAME_POSITION_MM = 0.01
@@ -203,7 +198,7 @@ def moduli_csv(store: Store, table: Table, first: Chosen, second: Chosen, kind: 
     """Young's modulus of each curve of both campaigns."""
     both = [store.read(campaigns.find, campaign_id) for campaign_id in (first, second)]
     rows = modulus_rows(kind, both, [d33_cache.answer(store, table, row, None) for row in both])
-    return numbers_of_rows(_file(both, "moduli"), _MODULUS_COLUMNS, rows)
+    return numbers_of_rows(_file(both, "moduli"), _OF_CURVES, rows)
 
 
 @downloadable(router, "/difference")

@@ -35,6 +35,9 @@ from underskin.prediction.answers import OTHER
 from underskin.prediction.answers import WORDS as CONTACT_WORDS
 from underskin.surrogate.sigma_table import SigmaTable
 
+router = APIRouter(prefix="/design")
+
+
 # Field, words, unit, the slider's ends.
 SLIDERS = (
     ("thickness_mm", "thickness h", "mm", 0.2, 20),
@@ -50,7 +53,6 @@ LABELS = labels_of(SLIDERS)
 WORDS = {name: (words, unit) for name, words, unit, *_ in SLIDERS if name != "dip_percent"}
 PIN, ACTION, MATERIAL = "pin", "do", "material"
 BLIND_PERCENT = 10.0  # of the response above a sensor: below, it is invisible
-router = APIRouter(prefix="/design")
 
 
 @dataclass(frozen=True)

@@ -37,12 +37,14 @@ from underskin.surrogate.sigma_table import SigmaTable
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
+router = APIRouter()
+
+
 _D33 = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n")
 _ABOUT_SENSOR = (
     "One recording of {sensor} with the models before and after, the worst explained one first; below, measured less "
     "predicted on the band that 95 % of the noise stays in."
 )
-router = APIRouter()
 _CAMPAIGN = re.compile(r"\bc-[0-9a-f]{16}\b")  # the id of one
 _ABOUT = {
     "where": "Each cell is the mean over the recordings in it, empty where there is none.",

@@ -41,6 +41,8 @@ from underskin.surrogate.sigma_table import SigmaTable
 if TYPE_CHECKING:
     from underskin.prediction.adopted_model import AdoptedModel
 
+router = APIRouter(prefix="/d33")
+
 
 # Words and unit of the additional values that a model may need besides sphere and preload.
 _NEEDED = {
@@ -49,7 +51,6 @@ _NEEDED = {
     "load_cycles": ("load cycles so far", ""),
     "sensor": ("sensor", ""),
 }
-router = APIRouter(prefix="/d33")
 FIELDS = tuple(field for field in SKIN_FIELDS if field[0] != "d33_pc_per_n")
 _LONGEST = 20_000  # characters of the rows
 _WITHOUT_UNCERTAINTY = 3  # numbers of a row

@@ -24,6 +24,9 @@ from underskin.mechanisms import Unsupported
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
+router = APIRouter(prefix="/mechanisms")
+
+
 WIDTH, HEIGHT = 440, 400
 _LEFT, _RIGHT, _PANEL, _GAP, _TOP = 62, 22, 122, 30, 18
 _WIDTHS = (1.2, 2.0, 3.0)  # weak, usual, strong
@@ -39,7 +42,6 @@ _DARK = {
 }  # fmt: skip
 _RULES = "".join(f'[fill="{light}"]{{fill:{dark}}}[stroke="{light}"]{{stroke:{dark}}}' for light, dark in _DARK.items())
 STYLE = f"@media (prefers-color-scheme:dark){{{_RULES}}}"
-router = APIRouter(prefix="/mechanisms")
 _STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
 _SHOWN = 8  # diagnoses of each mechanism; the file of numbers has all
 

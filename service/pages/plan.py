@@ -24,10 +24,12 @@ from underskin.errors import UnderskinError, out_of_range, required
 if TYPE_CHECKING:
     from underskin.diagnosis.planning.rig_limits import RigLimits
 
+router = APIRouter(prefix="/diagnoses/{diagnosis_id}/plan")
+
+
 _HEADS = {
     "indenter_radius_mm": "sphere radius [mm]", "position_mm": "place x, y [mm]", "dwell_s": "hold [s]",
 }  # fmt: skip
-router = APIRouter(prefix="/diagnoses/{diagnosis_id}/plan")
 _LOWEST, _HIGHEST, _RECORDINGS = "lowest_preload_n", "highest_preload_n", "recordings"
 
 # Field, words, unit, whether it takes several numbers.

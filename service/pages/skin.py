@@ -51,6 +51,9 @@ from underskin.inversion.array_history import interval
 from underskin.recordings.readers.text import in_lab
 from underskin.surrogate.sigma_table import SigmaTable
 
+router = APIRouter(prefix="/skins/{skin_id}")
+
+
 _MOST_NAMED = 5  # sensors, in a sentence
 Shown = Literal["d33", "uncertainty", "trend"]
 
@@ -64,7 +67,6 @@ _ENDS: dict[Shown, tuple[str, str]] = {
     "d33": ("d33_low_pc_per_n", "d33_high_pc_per_n"),
     "trend": ("slope_low_pc_per_n_per_year", "slope_high_pc_per_n_per_year"),
 }  # columns of 95 % intervals
-router = APIRouter(prefix="/skins/{skin_id}")
 _ON_A_PAGE = 50
 _SEVERAL: tuple[DiagnosisKind, ...] = ("skin", "fleet")
 _MOST_TOGETHER = 5  # of the latest diagnoses of each kind

@@ -28,9 +28,11 @@ from service.usecases import d33_cache, mechanism_catalogue
 from service.usecases.scheduled_backups import ScheduledBackups
 from underskin.surrogate.sigma_table import SigmaTable
 
+router = APIRouter()
+
+
 _WIDTH, _HEIGHT, _EDGE = 120, 28, 3
 _LEAST_SPAN = 0.2  # of the values, over the height
-router = APIRouter()
 SKIN = "example"
 _FOLDER = Path(__file__).parent / "example"
 _ON_A_PAGE = 25

@@ -30,7 +30,7 @@ from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 _PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
 _DISTANCES = 16
-_BISECTIONS = 7  # of a bisection
+_BISECTIONS = 7
 THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # the search range, within the table
 _THICKNESSES, _RADII = 8, 6
 _CONTACT: ContactName = "solved"

@@ -48,12 +48,14 @@ from underskin.recordings import rig_description
 from underskin.recordings.frf.estimators import checked_estimator
 from underskin.recordings.rig_guess import guessed
 
+router = APIRouter(prefix="/upload")
+
+
 _LONGEST_FIELD = 1000  # bytes of a field other than the files
 _ESTIMATOR = "estimator"
 _ESTIMATORS = {"H1": "noise in the charge", "H2": "noise in the force", "Hv": "noise in both"}  # for which each is
 _MOST_SKINS = 200  # that the form offers
 _MOST_NAMED = 5  # files in the request that does the same
-router = APIRouter(prefix="/upload")
 
 
 @router.get("")
