@@ -4,14 +4,14 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from anyio import to_thread
-from fastapi import Depends, FastAPI, Security
+from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
 from service import pages
 from service.auth.access_control import AccessControl
 from service.auth.login_throttle import LoginThrottle
-from service.dependencies import authorised
+from service.dependencies import MAY_CHANGE
 from service.ingest.uploads import UploadFolder
 from service.jobs.planner import Planner
 from service.jobs.process import WorkerProcesses
@@ -103,9 +103,10 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
     # Each on its own: FastAPI prepares the routes of a router within a router once more.
-    guards = [Security(authorised, scopes=["read"]), Depends(known_query)]
+    guards = [MAY_CHANGE, Depends(known_query)]
+    api.include_router(computed.router, dependencies=[Depends(known_query)])
     of_skins = (campaigns, diagnoses, exports, skins, changes, models)
-    for noun in (computed, *of_skins, mechanisms):
+    for noun in (*of_skins, mechanisms):
         api.include_router(noun.router, dependencies=guards)
     for router in (umbridge.router, health.router, openapi.router):
         api.include_router(router)

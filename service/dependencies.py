@@ -3,8 +3,7 @@
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any
 
-from fastapi import Depends, Path, Query, Request, Security
-from fastapi.security import SecurityScopes
+from fastapi import Depends, Path, Query, Request
 
 from service.auth.access_control import SAFE, AccessControl
 from service.auth.keys import Key
@@ -49,17 +48,18 @@ Limit = Annotated[int, Query(ge=1, le=200, description="How many on a page.")]
 Cursor = Annotated[str | None, Query(description="`next` of the page before.")]
 
 
-def authorised(scopes: SecurityScopes, request: Request) -> None:
-    """Rejects a key of too narrow a scope; whether a key is required was checked before."""
+def _may_change(request: Request) -> None:
+    """Rejects a request to change what is kept if its key has scope read; whether a key is required was checked
+    before."""
     key: Key | None = request.scope["key"]
-    if key is not None and "write" in scopes.scopes and key.scope != "write":
+    if request.method not in SAFE and key is not None and key.scope != "write":
         raise Refusal(
             403,
             f"Key {key.name!r} has scope read; this needs one of scope write: underskin key create NAME --scope write",
         )
 
 
-WRITE = [Security(authorised, scopes=["write"])]
+MAY_CHANGE = Depends(_may_change)  # of every route but those whose POST only computes
 
 
 def sender(request: Request) -> str | None:

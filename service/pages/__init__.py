@@ -3,6 +3,7 @@
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
+from service.dependencies import MAY_CHANGE
 from service.pages import (
     array,
     campaign,
@@ -31,10 +32,14 @@ _PAGES = (
 )  # fmt: skip
 
 
+_KEEP_NOTHING = (array, login)  # whose forms are for every key
+
+
 def add_to(api: FastAPI) -> None:
     """Add the pages to the service; they are not in the OpenAPI document."""
     for page in _PAGES:
-        api.include_router(page.router, include_in_schema=False)
+        guards = [] if page in _KEEP_NOTHING else [MAY_CHANGE]
+        api.include_router(page.router, include_in_schema=False, dependencies=guards)
 
 
 def methods(path: str) -> list[str]:

@@ -12,7 +12,7 @@ from jinja2 import UndefinedError
 from markupsafe import Markup
 from sqlalchemy import Connection
 
-from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
+from service.dependencies import CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
 from service.pages.plan import FIELDS, PlannedRow, heads, is_undecided, planned_rows, rig_answer
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.downloads import Numbers, attachment, downloadable
@@ -137,7 +137,7 @@ def _recording_rows(meta: Mapping[str, Any], numbers: list[int]) -> list[dict[st
     ]
 
 
-@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[FORM_OF_SESSION])
 def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: Store, table: Table) -> Response:
     """Queue it; an existing diagnosis of the campaign's present state is shown."""
     row = store.write(usecase.ask, campaign_id, table, sender(request))
@@ -145,7 +145,7 @@ def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: S
     return see(f"/diagnoses/{row.id}")
 
 
-@router.post("/diagnoses/{diagnosis_id}/again", dependencies=WRITE)
+@router.post("/diagnoses/{diagnosis_id}/again")
 def ask_again(
     request: Request, diagnosis_id: DiagnosisId, sent: Form, runner: RunnerInUse, store: Store, table: Table
 ) -> Response:
@@ -260,7 +260,7 @@ def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Numbers
         _cannot_be_shown(row)
 
 
-@router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/diagnoses/{diagnosis_id}/cancel", dependencies=[FORM_OF_SESSION])
 def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> Response:
     """Cancel it."""
     store.write(diagnoses.cancel, diagnosis_id)
@@ -268,7 +268,7 @@ def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> Resp
     return see(f"/diagnoses/{quote(diagnosis_id, safe='')}")
 
 
-@router.post("/diagnoses/{diagnosis_id}/adopt", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/diagnoses/{diagnosis_id}/adopt", dependencies=[FORM_OF_SESSION])
 def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
     """Make it the model of its skin."""
     with store.writing() as connection:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from service.dependencies import WRITE, RunnerInUse, Store, Table, sender
+from service.dependencies import RunnerInUse, Store, Table, sender
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.forms import Form, in_form_words, see
 from service.pages.shared.html import page
@@ -36,7 +36,7 @@ def fleets(
     return _choice(request, store, find, after, chosen, name)
 
 
-@router.post("/diagnosis", dependencies=WRITE)
+@router.post("/diagnosis")
 def ask(request: Request, sent: Form, runner: RunnerInUse, store: Store, table: Table) -> Response:
     """Queue the diagnosis of the chosen skins; an existing one is shown. Errors are shown in the form, with all
     choices."""

@@ -9,7 +9,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 from fastapi import APIRouter, Request, Response
 
-from service.dependencies import WRITE, Store, Table
+from service.dependencies import Store, Table
 from service.pages.shared import same_request
 from service.pages.shared.downloads import Numbers, downloadable
 from service.pages.shared.forms import FORM_OF_SESSION, Form, see
@@ -202,7 +202,7 @@ def found_csv(name: str, store: Store) -> Numbers:
     return Numbers(f"{name}-found", columns)
 
 
-@router.post("", dependencies=WRITE)
+@router.post("")
 def keep_found(sent: Form, store: Store) -> Response:
     """Store the law that a diagnosis found as a mechanism."""
     description = sent.get("description", "").strip()[:500] or None
@@ -210,7 +210,7 @@ def keep_found(sent: Form, store: Store) -> Response:
     return see("/mechanisms")
 
 
-@router.post("/{name}/discard", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/{name}/discard", dependencies=[FORM_OF_SESSION])
 def discard(name: str, store: Store) -> Response:
     """Remove it from the catalogue."""
     store.read(usecase.discard, name)

@@ -14,7 +14,7 @@ from sqlalchemy import Connection
 from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import WRITE, Store, Table, number_of_cursor, sender
+from service.dependencies import Store, Table, number_of_cursor, sender
 from service.ingest.accept import IngestOptions, accept
 from service.ingest.uploads import Upload
 from service.pages.shared import same_request, verdicts
@@ -71,7 +71,7 @@ def _scaled(values: Sequence[float], length: int) -> list[float]:
     return [_EDGE + (value - values[0]) / span * (length - 2 * _EDGE) for value in values]
 
 
-@router.post("/example", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/example", dependencies=[FORM_OF_SESSION])
 async def load(request: Request, store: Store, table: Table) -> Response:
     """Store the example's campaigns once; again if all were withdrawn."""
     withdrawn = await run_in_threadpool(store.read, _withdrawn)

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import WRITE, CampaignId, Cursor, Limit, Store, Table, number_of_cursor, sender
+from service.dependencies import CampaignId, Cursor, Limit, Store, Table, number_of_cursor, sender
 from service.ingest.accept import RIG, IngestOptions, accept
 from service.ingest.reading import keeping
 from service.ingest.uploads import FILE, received, split
@@ -96,7 +96,6 @@ _BODY: dict[str, Any] = {
     "/campaigns",
     summary="Send campaigns",
     status_code=201,
-    dependencies=WRITE,
     openapi_extra=_BODY,
     responses={201: {"model": models.CampaignResult | models.BatchResult}},
 )
@@ -207,7 +206,7 @@ def campaign_d33(
     return D33(**d33_cache.by_model(store, table, row, model, band))
 
 
-@router.post("/campaigns/{campaign_id}/withdraw", summary="Withdraw it", dependencies=WRITE)
+@router.post("/campaigns/{campaign_id}/withdraw", summary="Withdraw it")
 def withdraw_campaign(
     request: Request, campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Store
 ) -> models.CampaignDetail:
@@ -217,7 +216,7 @@ def withdraw_campaign(
         return usecase.detail(connection, campaign_id)
 
 
-@router.post("/campaigns/{campaign_id}/exclusions", summary="Exclude a recording", dependencies=WRITE)
+@router.post("/campaigns/{campaign_id}/exclusions", summary="Exclude a recording")
 def exclude_recording(
     request: Request, campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table
 ) -> models.CampaignDetail:

@@ -7,7 +7,6 @@ from fastapi import APIRouter, Body, Depends, Query
 from sqlalchemy import Connection
 
 from service.dependencies import (
-    WRITE,
     CampaignId,
     Cursor,
     DiagnosisId,
@@ -48,7 +47,7 @@ class Queue:
 InQueue = Annotated[Queue, Depends()]
 
 
-@router.post("/campaigns/{campaign_id}/diagnosis", summary="Ask for its diagnosis", status_code=202, dependencies=WRITE)
+@router.post("/campaigns/{campaign_id}/diagnosis", summary="Ask for its diagnosis", status_code=202)
 def diagnose_campaign(
     campaign_id: CampaignId, queue: InQueue, asked: Annotated[models.AskFor, Body(default_factory=models.AskFor)]
 ) -> models.Asked:
@@ -62,12 +61,7 @@ def diagnose_campaign(
     return queue.put(asked.without or None, act)
 
 
-@router.post(
-    "/skins/{skin_id}/diagnosis",
-    summary="Ask for a diagnosis of its campaigns together",
-    status_code=202,
-    dependencies=WRITE,
-)
+@router.post("/skins/{skin_id}/diagnosis", summary="Ask for a diagnosis of its campaigns together", status_code=202)
 def diagnose_skin(
     skin_id: SkinId, queue: InQueue, asked: Annotated[models.AskForSkin, Body(default_factory=models.AskForSkin)]
 ) -> models.Asked:
@@ -82,9 +76,7 @@ def diagnose_skin(
     return queue.put(asked.model_dump(), act)
 
 
-@router.post(
-    "/fleets/diagnosis", summary="Ask for a diagnosis of several skins together", status_code=202, dependencies=WRITE
-)
+@router.post("/fleets/diagnosis", summary="Ask for a diagnosis of several skins together", status_code=202)
 def diagnose_fleet(queue: InQueue, asked: models.AskForFleet) -> models.Asked:
     """Puts one diagnosis of all campaigns of these skins into the queue: what they have in common, and which skin
     departs from the others. The same request on campaigns that have not changed is answered with that diagnosis.
@@ -123,7 +115,7 @@ def diagnosis(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
         return models.Diagnosis(**usecase.entry(connection, row), report=report)
 
 
-@router.delete("/diagnoses/{diagnosis_id}", summary="Cancel a diagnosis", dependencies=WRITE)
+@router.delete("/diagnoses/{diagnosis_id}", summary="Cancel a diagnosis")
 def cancel_diagnosis(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> models.DiagnosisEntry:
     """Ends its process, or takes it out of the queue. One that is done or has failed stays: 409."""
     with store.writing() as connection:

@@ -7,7 +7,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import WRITE, SkinId, Store
+from service.dependencies import SkinId, Store
 from service.ingest import skin_imports
 from service.ingest.uploads import UploadFolder, received, split
 from service.problems import Refusal
@@ -44,7 +44,6 @@ def _exported(store: Database, request: Request, skin_id: str) -> Response:
 @router.post(
     "/skins/import",
     summary="Bring in a skin that was exported",
-    dependencies=WRITE,
     openapi_extra={
         "requestBody": {"required": True, "content": {"application/octet-stream": _FILE["content"][_MEDIA_TYPE]}}
     },

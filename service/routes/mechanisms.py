@@ -7,7 +7,7 @@ import yaml
 from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import WRITE, Store
+from service.dependencies import Store
 from service.middleware.json_bodies import require_unique_keys
 from service.problems import Refusal, validated
 from service.schemas.mechanisms import KeepFound, MechanismEntry, MechanismList
@@ -65,9 +65,7 @@ def mechanisms() -> MechanismList:
     return MechanismList(mechanisms=usecase.entries(), unusable=usecase.unusable())
 
 
-@router.post(
-    "/mechanisms", summary="Keep one of the lab's own", status_code=201, dependencies=WRITE, openapi_extra=_BODY
-)
+@router.post("/mechanisms", summary="Keep one of the lab's own", status_code=201, openapi_extra=_BODY)
 async def keep_mechanism(request: Request, store: Store) -> MechanismEntry:
     """Diagnoses that are asked for from now on know it by name; 409 where the name is taken. Its law is an expression,
     of which no code is ever executed."""
@@ -83,7 +81,7 @@ async def keep_mechanism(request: Request, store: Store) -> MechanismEntry:
         raise error.of_field("mechanism", None) from None
 
 
-@router.delete("/mechanisms/{name}", summary="Discard one of the lab's own", dependencies=WRITE)
+@router.delete("/mechanisms/{name}", summary="Discard one of the lab's own")
 def discard_mechanism(
     name: Annotated[str, Path(description="Of one of the lab's own mechanisms.")], store: Store
 ) -> MechanismEntry:

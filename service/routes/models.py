@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 from fastapi.responses import JSONResponse
 from sqlalchemy import Connection
 
-from service.dependencies import WRITE, SkinId, Store
+from service.dependencies import SkinId, Store
 from service.middleware.json_bodies import JsonRoute
 from service.problems import Refusal
 from service.routes.idempotency import Idempotent
@@ -19,11 +19,7 @@ router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
 
 
 @router.post(
-    "/skins/{skin_id}/model",
-    summary="Adopt a model",
-    status_code=201,
-    dependencies=WRITE,
-    responses={201: {"model": answers.ModelEntry}},
+    "/skins/{skin_id}/model", summary="Adopt a model", status_code=201, responses={201: {"model": answers.ModelEntry}}
 )
 def adopt_model(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempotent) -> JSONResponse:
     """Makes an explained diagnosis the skin's model: `/v1/frf`, `/v1/d33`, the d33 of campaigns and the history serve
@@ -37,7 +33,7 @@ def adopt_model(skin_id: SkinId, adoption: answers.Adoption, idempotency: Idempo
     return JSONResponse(idempotency.answer(adoption.diagnosis_id, act), status_code=201)
 
 
-@router.delete("/skins/{skin_id}/model", summary="Withdraw the model in force", dependencies=WRITE)
+@router.delete("/skins/{skin_id}/model", summary="Withdraw the model in force")
 def withdraw_model(
     skin_id: SkinId, reason: Annotated[ReasonText, Query(description="Why; kept with it.")], idempotency: Idempotent
 ) -> answers.ModelVersion:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request
 
-from service.dependencies import WRITE, Cursor, Limit, SkinId, Store, Table, sender
+from service.dependencies import Cursor, Limit, SkinId, Store, Table, sender
 from service.middleware.json_bodies import JsonRoute
 from service.schemas import skins as models
 from service.store import skins
@@ -33,7 +33,7 @@ def skin(skin_id: SkinId, store: Store) -> models.SkinDetail:
     return store.read(usecase.detail, skin_id)
 
 
-@router.post("/skins/{skin_id}/join", summary="Join another skin to it", dependencies=WRITE)
+@router.post("/skins/{skin_id}/join", summary="Join another skin to it")
 def join_skins(request: Request, skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
     """Two ids turned out to mean one skin: from now on figures of this one use the campaigns of both."""
     usecase.join(store, skin_id, join.skin_id, join.reason, sender(request))

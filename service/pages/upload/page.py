@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
-from service.dependencies import WRITE, Store, Table
+from service.dependencies import Store, Table
 from service.ingest import rig_words, skin_imports
 from service.ingest.accept import RIG
 from service.ingest.reading import MOST_RECORDINGS, InspectedFile, keeping
@@ -90,7 +90,7 @@ def _form(request: Request, store: Database, skin: str, corrects: str, error: st
     )
 
 
-@router.post("", dependencies=WRITE)
+@router.post("")
 async def send(request: Request, store: Store) -> Response:
     """Receives files for preview; nothing is stored."""
     held: PendingUploads = request.app.state.pending_uploads
@@ -212,7 +212,7 @@ def _understood(
     )
 
 
-@router.post("/{upload_id}/mapping", dependencies=WRITE)
+@router.post("/{upload_id}/mapping")
 async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again with the values of the form."""
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
@@ -243,7 +243,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     return see(f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/template", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/{upload_id}/template", dependencies=[FORM_OF_SESSION])
 async def use_template(request: Request, pending: Pending, store: Store) -> Response:
     """Reads the files as earlier files of the same instrument."""
     await run_in_threadpool(use_template_of, store, pending)
@@ -251,7 +251,7 @@ async def use_template(request: Request, pending: Pending, store: Store) -> Resp
     return see(f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/afresh", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/{upload_id}/afresh", dependencies=[FORM_OF_SESSION])
 async def start_afresh(request: Request, pending: Pending) -> Response:
     """Reads the files without values remembered from earlier ones."""
     pending.start_afresh()
@@ -265,7 +265,7 @@ def use_template_of(store: Database, pending: PendingUpload) -> None:
     templates.use(store, pending, _latest(store, pending.skin or skin))
 
 
-@router.post("/{upload_id}/signs", dependencies=WRITE)
+@router.post("/{upload_id}/signs")
 async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again with curves that count pressing negative inverted, or unchanged."""
     pending.turned = sent.get("turned") == "yes" and not pending.is_depth_composed
@@ -273,7 +273,7 @@ async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response
     return see(f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/keep", dependencies=WRITE)
+@router.post("/{upload_id}/keep")
 async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
     """Stores the valid part."""
     async with keeping(store):
@@ -282,7 +282,7 @@ async def keep(request: Request, sent: Form, pending: Pending, store: Store, tab
     return see(pending.kept_at or f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/skin", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/{upload_id}/skin", dependencies=[FORM_OF_SESSION])
 async def bring_in(pending: Pending, store: Store) -> Response:
     """Imports an exported skin."""
     if pending.skin_summary is None:
@@ -330,14 +330,14 @@ def _csv(
     return Numbers(name, columns(looked(request, pending, file)))
 
 
-@router.post("/{upload_id}/discard", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/{upload_id}/discard", dependencies=[FORM_OF_SESSION])
 def discard(pending: Pending) -> Response:
     """Puts it aside; for a while it can be taken back."""
     pending.discarded = True
     return see("/upload")
 
 
-@router.post("/{upload_id}/restore", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/{upload_id}/restore", dependencies=[FORM_OF_SESSION])
 def restore(pending: UploadOfSession) -> Response:
     """Takes back that it was discarded."""
     pending.discarded = False
