@@ -13,7 +13,7 @@ from service.pages.shared import same_request, verdicts
 from service.pages.shared.downloads import Numbers, downloadable, file_name, numbers_of_rows
 from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, drawn_curves, drawn_frf, sensors_of
 from service.pages.shared.formats import condition_columns
-from service.pages.shared.forms import RefusedForm, in_form_words, number
+from service.pages.shared.forms import Refused, RefusedForm, in_form_words, number
 from service.pages.shared.html import page
 from service.pages.shared.verdicts import attention
 from service.schemas.campaign_d33 import D33Value
@@ -22,7 +22,6 @@ from service.usecases import changes, d33_cache
 from service.usecases.figure_data import frf_columns
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign
-from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/campaigns/{campaign_id}")
 
@@ -151,23 +150,11 @@ def campaign(
     table: Table,
     show: str = "",
     first: Annotated[int, Query(ge=0, le=10**9)] = 0,
+    refused: Refused = None,
 ) -> Response:
     """The page of a campaign. `show`: the sensor or recording whose lines are drawn; `first`: index of the first
     listed recording. Values are averaged over the band of the address; if that is invalid, over the flat zone, with
     the reason in the form."""
-    return shown(request, campaign_id, store, table, show, first=first)
-
-
-def shown(
-    request: Request,
-    campaign_id: str,
-    store: Database,
-    table: SigmaTable,
-    show: str = "",
-    refused: RefusedForm | None = None,
-    first: int = 0,
-) -> Response:
-    """The page; `refused`: a form of it that was sent and is invalid."""
     typed = [request.query_params.get(name, "")[:40] for name in ("band_low_hz", "band_high_hz")]
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)

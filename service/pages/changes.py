@@ -42,14 +42,14 @@ class Change:
         refused = attempted(form, self.sent, do)
         if refused is None:
             return see(f"/campaigns/{quote(campaign_id, safe='')}")
-        return campaign.shown(self.request, campaign_id, self.store, self.table, refused=refused)
+        return campaign.campaign(self.request, campaign_id, self.store, self.table, refused=refused)
 
     def of_skin(self, skin_id: str, form: str, do: Callable[[], object]) -> Response:
         """The same of a skin."""
         refused = attempted(form, self.sent, do)
         if refused is None:
             return see(f"/skins/{quote(skin_id, safe='')}")
-        return skin.shown(self.request, skin_id, self.store, self.table, refused=refused)
+        return skin.skin(self.request, skin_id, self.store, self.table, refused=refused)
 
     def write_root(self, skin_id: str, change: Callable[..., object], *values: object) -> None:
         """Change the skin that an id counts as."""

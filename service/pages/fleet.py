@@ -1,17 +1,17 @@
 """Fleets: skins of one batch are chosen, named and diagnosed together; lists earlier diagnoses."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import RunnerInUse, Store, Table, sender
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.forms import Form, in_form_words, see
+from service.pages.shared.forms import NOT_ASKED, Form, in_form_words, see
 from service.pages.shared.html import page
 from service.problems import parsed
 from service.schemas.diagnoses import FEWEST_SKINS, AskForFleet
-from service.store import Conflict, Database, diagnoses, skins
+from service.store import Conflict, diagnoses, skins
 from service.usecases import diagnoses as usecase
 from underskin.errors import UnderskinError, too_few
 
@@ -31,46 +31,10 @@ def fleets(
     after: Annotated[str | None, Query(max_length=200)] = None,
     chosen: Annotated[tuple[str, ...], Query(max_length=_ON_A_PAGE)] = (),
     name: Annotated[str, Query(max_length=200)] = "",
+    error: Annotated[UnderskinError | Conflict | None, NOT_ASKED] = None,
 ) -> Response:
-    """The skins to choose from, by id; choices and texts are kept when the list is searched."""
-    return _choice(request, store, find, after, chosen, name)
-
-
-@router.post("/diagnosis")
-def ask(request: Request, sent: Form, runner: RunnerInUse, store: Store, table: Table) -> Response:
-    """Queue the diagnosis of the chosen skins; an existing one is shown. Errors are shown in the form, with all
-    choices."""
-    try:
-        row = store.write(usecase.ask_of_fleet, table, sender(request), _requested(sent))
-    except (UnderskinError, Conflict) as error:
-        find, after = sent.get("find", ""), sent.get("after") or None
-        return _choice(request, store, find, after, _chosen(sent), sent.get("name", ""), error)
-    runner.stir()
-    return see(f"/diagnoses/{row.id}")
-
-
-def _chosen(sent: Mapping[str, str]) -> list[str]:
-    return [value for name, value in sent.items() if name.startswith(_BOX)]
-
-
-def _requested(sent: Mapping[str, str]) -> AskForFleet:
-    """The request of the form; raises InvalidInput."""
-    chosen = _chosen(sent)
-    if len(chosen) < FEWEST_SKINS:
-        raise too_few("skins", f"{len(chosen)} chosen", f"must be {FEWEST_SKINS} at least: tick those of one make")
-    return parsed(AskForFleet, {"skins": chosen, "name": sent.get("name", "").strip()})
-
-
-def _choice(
-    request: Request,
-    store: Database,
-    find: str,
-    after: str | None,
-    chosen: Collection[str],
-    name: str,
-    error: UnderskinError | Conflict | None = None,
-) -> Response:
-    """The page with the skins to choose from: those that are chosen and not in this part of the list, then the list."""
+    """The skins to choose from: those that are chosen and not in this part of the list, then the list, by id. Choices
+    and texts are kept when the list is searched."""
     with store.reading() as connection:
         rows = skins.listed(connection, find or None, after, _ON_A_PAGE + 1)
         following = rows[_ON_A_PAGE - 1].id if len(rows) > _ON_A_PAGE else None
@@ -102,3 +66,28 @@ def _choice(
             f"client.fleets.diagnose({example['skins']!r}, {example['name']!r})",
         ),
     )
+
+
+@router.post("/diagnosis")
+def ask(request: Request, sent: Form, runner: RunnerInUse, store: Store, table: Table) -> Response:
+    """Queue the diagnosis of the chosen skins; an existing one is shown. Errors are shown in the form, with all
+    choices."""
+    try:
+        row = store.write(usecase.ask_of_fleet, table, sender(request), _requested(sent))
+    except (UnderskinError, Conflict) as error:
+        find, after = sent.get("find", ""), sent.get("after") or None
+        return fleets(request, store, find, after, _chosen(sent), sent.get("name", ""), error)
+    runner.stir()
+    return see(f"/diagnoses/{row.id}")
+
+
+def _chosen(sent: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(value for name, value in sent.items() if name.startswith(_BOX))
+
+
+def _requested(sent: Mapping[str, str]) -> AskForFleet:
+    """The request of the form; raises InvalidInput."""
+    chosen = _chosen(sent)
+    if len(chosen) < FEWEST_SKINS:
+        raise too_few("skins", f"{len(chosen)} chosen", f"must be {FEWEST_SKINS} at least: tick those of one make")
+    return parsed(AskForFleet, {"skins": chosen, "name": sent.get("name", "").strip()})

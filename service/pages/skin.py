@@ -27,7 +27,7 @@ from service.pages.shared.figures import (
     drawn_history,
     sensors_of,
 )
-from service.pages.shared.forms import RefusedForm
+from service.pages.shared.forms import Refused
 from service.pages.shared.html import page
 from service.pages.shared.verdicts import adopted_versions, answer_by_it, attention, change_percent
 from service.schemas.campaign_d33 import D33Value
@@ -194,24 +194,10 @@ def skin(
     sensor: str | None = None,
     before: str | None = None,
     by: Annotated[By | None, Query(alias="model")] = None,
+    refused: Refused = None,
 ) -> Response:
     """The page of a skin. `sensor`: the one whose FRFs and history are drawn; `by`: the model of d33, by default the
     one in force, or the paper's if that has no d33 of the latest campaign with FRFs."""
-    return shown(request, skin_id, store, table, show, sensor, before, by)
-
-
-def shown(
-    request: Request,
-    skin_id: str,
-    store: Database,
-    table: SigmaTable,
-    show: Shown = "d33",
-    sensor: str | None = None,
-    before: str | None = None,
-    by: By | None = None,
-    refused: RefusedForm | None = None,
-) -> Response:
-    """The page; `refused`: a form of it that was sent and cannot be used."""
     root, waiting, computed = _completed(store, table, skin_id)
     with store.reading() as connection:
         rows = campaigns.by_time(connection, root, number_of_cursor(before), _ON_A_PAGE + 1)

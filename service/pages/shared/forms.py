@@ -124,6 +124,10 @@ class RefusedForm:
     status: int
 
 
+NOT_ASKED = Depends(lambda: None)  # of what no address gives, but a form that was rejected and is shown again
+Refused = Annotated[RefusedForm | None, NOT_ASKED]
+
+
 def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> RefusedForm | None:
     """Do the action of a form; if it fails, the form with the reason."""
     try:

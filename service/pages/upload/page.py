@@ -18,7 +18,7 @@ from service.pages.shared import same_request
 from service.pages.shared.downloads import Numbers, attachment, downloadable
 from service.pages.shared.figures import Drawn
 from service.pages.shared.formats import condition_columns
-from service.pages.shared.forms import FORM_OF_SESSION, TOKEN, Form, require_form_token, see
+from service.pages.shared.forms import FORM_OF_SESSION, NOT_ASKED, TOKEN, Form, require_form_token, see
 from service.pages.shared.html import page
 from service.pages.upload import error_words, exported_skin, file_summary, templates
 from service.pages.upload import mapping as mappings
@@ -64,12 +64,9 @@ def form(
     store: Store,
     skin: Annotated[str, Query(max_length=200)] = "",
     corrects: Annotated[str, Query(max_length=200)] = "",
+    error: Annotated[str | None, NOT_ASKED] = None,
 ) -> Response:
     """Asks for files; `corrects`: the campaign that they replace."""
-    return _form(request, store, skin, corrects)
-
-
-def _form(request: Request, store: Database, skin: str, corrects: str, error: str | None = None) -> Response:
     skin_ids = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     corrected = store.read(campaigns.find, corrects) if corrects else None
     held: PendingUploads = request.app.state.pending_uploads
@@ -104,7 +101,7 @@ async def send(request: Request, store: Store) -> Response:
         if not given:
             error = "No file came. Choose one, or drop it on the page."
             filled = fields.get(SKIN_FIELD, ""), fields.get(CORRECTS, "")
-            return await run_in_threadpool(_form, request, store, *filled, error)
+            return await run_in_threadpool(form, request, store, *filled, error)
         corrects = fields.get(CORRECTS) or None
         estimator_typed = fields.get(_ESTIMATOR)
         estimator = checked_estimator(_ESTIMATOR, estimator_typed) if estimator_typed else None
