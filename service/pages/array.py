@@ -13,7 +13,7 @@ from urllib.parse import urlencode
 
 import numpy as np
 import orjson
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import Store, Table
@@ -221,12 +221,16 @@ def _sensors(store: Database, skin_id: str) -> Sequence[Mapping[str, Any]] | Non
     return None if row is None else row.about["skin"]["sensors"] or None
 
 
+def _of_address(request: Request, store: Store, table: Table, skin: str | None = None) -> Described:
+    return described(store, table, request.query_params, skin)
+
+
+ArrayOfQuery = Annotated[Described, Depends(_of_address)]
+
+
 @router.get("")
-def loads_view(
-    request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS
-) -> Response:
+def loads_view(request: Request, array: ArrayOfQuery, loads: Loads = _LOADS) -> Response:
     """The skin and the loads of the address, or else the paper's prototype under two spheres."""
-    array = described(store, table, request.query_params, skin)
     lines = [number for number, line in enumerate(loads.splitlines(), 1) if line.strip()]
     document, answer, wrong = tried(request, lambda: _document(array, loads), lines)
     return page(
@@ -245,16 +249,15 @@ def loads_view(
 
 
 @downloadable(router, "/charge")
-def charge_csv(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Numbers:
+def charge_csv(request: Request, array: ArrayOfQuery, loads: Loads = _LOADS) -> Numbers:
     """Charge and stress on each sensor."""
-    answer = answered(request, _document(described(store, table, request.query_params, skin), loads))
-    return Numbers("charge", charge_columns(answer))
+    return Numbers("charge", charge_columns(answered(request, _document(array, loads))))
 
 
 @downloadable(router, "/base")
-def base_csv(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Numbers:
+def base_csv(request: Request, array: ArrayOfQuery, loads: Loads = _LOADS) -> Numbers:
     """The normal stress on the base, a row for each grid point."""
-    document = _document(described(store, table, request.query_params, skin), loads)
+    document = _document(array, loads)
     transmitted = _transmitted_contacts(document, answered(request, document))
     stress = _base_stress(request, {**document, "contacts": transmitted or document["contacts"]})
     x, y = np.meshgrid(stress.x_mm, stress.y_mm)

@@ -24,7 +24,7 @@ from service.pages.shared.forms import (
     see,
     wrong_fields,
 )
-from service.pages.shared.html import compress, page
+from service.pages.shared.html import json_answer, page
 from service.pages.shared.skin_values import start
 from service.problems import parsed
 from service.schemas.design import DesignAnswer, DesignRequest
@@ -251,10 +251,7 @@ def at_once(request: Request, table: Table, sliders: SlidersOfQuery) -> Response
         "materials": with_values(sliders.values),
         "same": [same.curl, same.python],
     }
-    content = orjson.dumps({"wrong": shown.wrong.sentences} if shown.wrong else changed)
-    answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
-    compress(request, answer)
-    return answer
+    return json_answer(request, orjson.dumps({"wrong": shown.wrong.sentences} if shown.wrong else changed))
 
 
 @downloadable(router, "/sweeps")

@@ -24,7 +24,7 @@ from service.pages.shared.forms import (
     quantities,
     wrong_fields,
 )
-from service.pages.shared.html import compress, page
+from service.pages.shared.html import json_answer, page
 from service.pages.shared.skin_values import UNITS, shown
 from underskin.errors import TableError, UnderskinError
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
@@ -66,7 +66,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
     """With the values of the address, or else those of the skin or of the paper's prototype."""
     values, taken = shown(store, table, request.query_params, skin, FIELDS)
     tried = _tried(request, table, values)
-    ok = tried.field is not None and tried.outside is None
+    field = None if tried.outside is not None else tried.field
     query = urlencode({**tried.given, **({UNITS: "yes"} if UNITS in request.query_params else {})})
     return page(
         request,
@@ -78,11 +78,11 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
         units_checked=UNITS in request.query_params,
         wrong=tried.wrong,
         outside=tried.outside,
-        told=_sentences(tried.field, 0) if ok and tried.field is not None else [],
-        error_percent=_error_percent(tried.field) if ok and tried.field is not None else 0.0,
+        told=[] if field is None else _sentences(field, 0),
+        error_percent=0.0 if field is None else 100 * float(field.section_error[0]),
         linear=tried.given.get("poisson_ratio") != INCOMPRESSIBLE,
-        figures=_figures(tried.field, query) if ok and tried.field is not None else [],
-        solved_mpa=_by_solved_contact(table, tried) if ok else None,
+        figures=[] if field is None else _figures(field, query),
+        solved_mpa=None if field is None else _by_solved_contact(table, field, tried.given),
         frames=f"/field/frames?{query}",
         count=FRAMES,
         same=_same(request, tried.given, units_checked=UNITS in request.query_params),
@@ -98,13 +98,8 @@ def at_once(request: Request, table: Table) -> Response:
     given = {name: number(name, request.query_params.get(name, "")) for name, *_ in FIELDS}
     field = _computed(table, given, FRAMES, UNITS in request.query_params)
     rows = range(FRAMES) if field.contact.inside.all() else ()
-    content = orjson.dumps(
-        [{"told": _sentences(field, row), "figures": frames(field, row)} for row in rows],
-        option=orjson.OPT_SERIALIZE_NUMPY,
-    )
-    answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
-    compress(request, answer)
-    return answer
+    shown_frames = [{"told": _sentences(field, row), "figures": frames(field, row)} for row in rows]
+    return json_answer(request, orjson.dumps(shown_frames, option=orjson.OPT_SERIALIZE_NUMPY))
 
 
 @downloadable(router, "/section")
@@ -130,12 +125,11 @@ def _tried(request: Request, table: SigmaTable, values: Mapping[str, str]) -> Sh
     return ShownField(field, given, field.limits[0])
 
 
-def _by_solved_contact(table: SigmaTable, tried: ShownField) -> float | None:
+def _by_solved_contact(table: SigmaTable, field: StressField, typed: Mapping[str, float]) -> float | None:
     """The sensor's mean stress [MPa] with the finite-strain contact if it differs by more than 1 %; None otherwise,
     or without the contact table, about which /tables informs."""
-    given = {name: np.array(value) for name, value in tried.given.items()}
-    assert tried.field is not None
-    paper = float(tried.field.contact.mean_stress[0])
+    given = {name: np.array(value) for name, value in typed.items()}
+    paper = float(field.contact.mean_stress[0])
     try:
         solved = float(pressed(contact_model(table, "solved"), given, units_checked=True).mean_stress)
     except TableError:
@@ -166,10 +160,6 @@ def _sentences(field: StressField, row: int) -> list[str]:
         f"{mean:.3g} MPa",
         f"{share:.3g} %",
     ]
-
-
-def _error_percent(field: StressField) -> float:
-    return 100 * float(field.section_error[0])
 
 
 def _figures(field: StressField, query: str) -> Sequence[Drawn]:

@@ -111,6 +111,13 @@ def problem_page(refusal: Refusal, request_id: str) -> Response:
     return HTMLResponse(text, refusal.status, {**headers(), **refusal.headers})
 
 
+def json_answer(request: Request, content: bytes) -> Response:
+    """JSON for a script of a page."""
+    answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
+    compress(request, answer)
+    return answer
+
+
 def compress(request: Request, answer: Response) -> None:
     """Gzip an answer if the browser accepts that. Its only secret is the session's own token, and requests from
     other sites carry no session, so lengths reveal nothing."""
