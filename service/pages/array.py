@@ -45,6 +45,8 @@ from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress, BaseStress, answer, base_stress
 from underskin.array_stress.request import LabContact, read_request
 from underskin.errors import InvalidInput, UnderskinError, all_of, noting, out_of_range, wrong_type
+from underskin.figures.array_map import disc_size
+from underskin.figures.loads import loaded_array, pressure_on_array, stress_on_base
 from underskin.findings.codes import Reason
 from underskin.prediction.columns import to_spreadsheet
 from underskin.recordings.readers import text
@@ -181,9 +183,6 @@ def charge_figure(
     answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], radius_mm: float, numbers: str
 ) -> Drawn:
     """The sensors coloured by charge, with the loads if they have positions; `radius_mm`: sensor radius."""
-    from underskin.figures.array_map import disc_size
-    from underskin.figures.loads import loaded_array
-
     x, y, charge, error = (answer.columns[name] for name in ("x_mm", "y_mm", "charge_pc", "charge_error_pc"))
     figure = loaded_array(answer.sensors, x, y, charge, error, loads_mm, radius_mm)
     about = f"Each sensor where it lies, coloured by its charge. {disc_size(x, y, radius_mm)}"
@@ -279,8 +278,6 @@ def _query(request: Request) -> str:
 
 def _on_base(request: Request, document: Mapping[str, Any]) -> list[Drawn]:
     """The stress on the base; none if it would take too long for a page or be too large."""
-    from underskin.figures.loads import stress_on_base
-
     contacts, sensors = document["contacts"], document["sensors"]
     if len(contacts) > _MOST_DRAWN or len(sensors) > _MOST_OUTLINES:
         return []
@@ -439,8 +436,6 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
 
 
 def _map_figures(document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
-    from underskin.figures.loads import pressure_on_array
-
     columns, held = answer.columns, document["pressure_map"]
     places = list(zip(columns["x_mm"].tolist(), columns["y_mm"].tolist(), strict=True))
     pressed = pressure_on_array(held["x_mm"], held["y_mm"], held["pressure_mpa"], places, document["sensor_radius_mm"])

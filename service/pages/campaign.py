@@ -21,6 +21,8 @@ from service.store import AnyRow, Database, annotations, campaigns, diagnoses
 from service.usecases import changes, d33_cache
 from service.usecases.figure_data import frf_columns
 from underskin.errors import InvalidInput
+from underskin.figures.array import frf_versus_preload, response_per_sensor
+from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
 from underskin.recordings.campaign import Campaign
 
 router = APIRouter(prefix="/campaigns/{campaign_id}")
@@ -86,9 +88,6 @@ def _chosen(answer: Mapping[str, Any]) -> str:
 def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str) -> list[Drawn]:
     """d33 against preload, per sensor and as a map; if `show` is a sensor, only its points against preload, and it
     is marked."""
-    from underskin.figures.array import frf_versus_preload, response_per_sensor
-    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
-
     if answer["band"] is None:
         return []
     names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(

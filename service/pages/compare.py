@@ -18,7 +18,10 @@ from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
 from service.usecases import d33_cache
 from service.usecases.figure_data import measured, spreads, spreads_of
-from underskin.inversion.comparison import in_words, with_differences
+from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
+from underskin.figures.curves import ForceCurve, curve_moduli, force_curves
+from underskin.figures.frf import frf_pair
+from underskin.inversion.comparison import in_words, mean_moduli, with_differences
 from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -54,8 +57,6 @@ def modulus_rows(kind: str, both: Sequence[AnyRow], answers: Sequence[Mapping[st
 
 def _mean_moduli(of_curves: Sequence[Mapping[str, Any]]) -> list[Any]:
     """The mean modulus of each campaign, and the difference second − first."""
-    from underskin.inversion.comparison import mean_moduli
-
     first, second = (np.array([row[_MODULUS] for row in of_curves if row["which"] == name]) for name in _NAMES)
     return mean_moduli(first, second)
 
@@ -64,8 +65,6 @@ def _curve_figures(
     store: Database, kind: str, both: Sequence[AnyRow], of_curves: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
     """The curves of both, each campaign in a colour, and the modulus of each curve."""
-    from underskin.figures.curves import ForceCurve, curve_moduli, force_curves
-
     curves, counts = [], []
     for name, row in zip(_NAMES, both, strict=True):
         campaign = store.read(campaigns.load, row, with_excluded=False)
@@ -236,8 +235,6 @@ def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 def _overlaid(store: Database, both: Sequence[AnyRow], stored: Sequence[Any]) -> list[Drawn]:
     """The FRFs of both, laid over each other under each sphere and preload that both have."""
-    from underskin.figures.frf import frf_pair
-
     of_each = [
         spreads(of_row) if of_row else spreads_of(measured(store.read(campaigns.load, row, with_excluded=False)))
         for row, of_row in zip(both, stored, strict=True)
@@ -253,8 +250,6 @@ def drawn_maps(
     both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
     """The maps of both with a common colour scale, and that of the difference; none if no d33 is known."""
-    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
-
     if not rows or not all(answer["sensors"] for answer in answers):
         return []
     values = [row[f"{which}_pc_per_n"] for row in rows for which in ("first", "second")]

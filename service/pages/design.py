@@ -31,6 +31,7 @@ from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of, other_sigma, require_apart
 from service.usecases.materials import ELASTOMERS, FILMS, MATERIALS, RATIO_SOURCE, with_values
 from underskin.errors import InvalidInput, UnderskinError, not_one_of, noting
+from underskin.figures.design import Pinned, array_response, design_overview
 from underskin.prediction.answers import OTHER
 from underskin.prediction.answers import WORDS as CONTACT_WORDS
 from underskin.surrogate.sigma_table import SigmaTable
@@ -293,8 +294,6 @@ def _computed(table: SigmaTable, sliders: Sliders) -> DesignAnswer:
 
 
 def _tried(table: SigmaTable, sliders: Sliders) -> ShownDesign:
-    from underskin.figures.design import Pinned, array_response, design_overview
-
     try:
         if sliders.error is not None:
             raise sliders.error

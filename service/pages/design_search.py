@@ -19,6 +19,7 @@ from service.problems import parsed
 from service.schemas.design import DesignDemand
 from service.usecases.design_search import NEARLY, Offer, Searched, search
 from underskin.errors import UnderskinError, noting
+from underskin.figures.design import Offered, design_region
 
 router = APIRouter(prefix="/design/search")
 
@@ -111,8 +112,6 @@ def region_csv(table: Table, typed: TypedInQuery) -> Numbers:
 
 
 def _figure(searched: Searched, typed: Typed) -> Drawn:
-    from underskin.figures.design import Offered, design_region
-
     region = searched.region
     offered = [
         Offered(offer.merit, offer.request.thickness_mm, offer.request.sensor_radius_mm) for offer in searched.offers

@@ -3,10 +3,12 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import Annotated, Any, NoReturn
 from urllib.parse import quote
 
 import orjson
+import plotly.graph_objects as go
+import plotly.io
 from fastapi import APIRouter, Path, Request, Response
 from jinja2 import UndefinedError
 from markupsafe import Markup
@@ -27,15 +29,16 @@ from service.usecases.adopted_models import adopt as adopt_model
 from service.usecases.skins import history_by_model
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
+from underskin.diagnosis.reporting import html_report
 from underskin.diagnosis.reporting.figure_columns import columns
 from underskin.diagnosis.reporting.wording import planned_columns
+from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
 from underskin.findings.formatting import in_digits
+from underskin.mechanisms.declared import saving
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unlisted.vocabulary import OF_SAMPLES, followed
+from underskin.prediction.adopted_model import implausible_d33, not_adopted
 from underskin.surrogate.sigma_table import SigmaTable
-
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
 
 router = APIRouter()
 
@@ -105,8 +108,6 @@ def shown_array(
 
 
 def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None) -> Drawn:
-    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
-
     names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(
         rows, "sensor", *_D33, "x_mm", "y_mm", "reasons"
     )
@@ -216,15 +217,11 @@ def _outdated(connection: Connection, row: AnyRow) -> str | None:
 @router.get("/diagnoses/{diagnosis_id}/report.html")
 def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
     """The report as a single self-contained file."""
-    import plotly.io
-
-    from underskin.diagnosis.reporting import html_report as file
-
     row, report, texts = _done(store, diagnosis_id)
     recorded = _recorded(store, row)
     try:
         figures: Mapping[str, go.Figure] | None = {name: plotly.io.from_json(text) for name, text in texts.items()}
-        content = file.page(report, figures or None, recorded)
+        content = html_report.page(report, figures or None, recorded)
     except _ODD:
         _cannot_be_shown(row)
     policy = {"Content-Security-Policy": "sandbox"}  # should anything open it in place
@@ -293,10 +290,8 @@ def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[s
 
 def _why_not_adopted(report: Mapping[str, Any]) -> str | None:
     """Why the law of a report cannot become a mechanism of the lab's own; None if it can."""
-    from underskin.mechanisms.declared.saving import document  # the models, which few pages need
-
     try:
-        document(report, "kept")
+        saving.document(report, "kept")
     except InvalidInput as refusal:
         return refusal.allowed.removesuffix(": it cannot be kept")  # as stated on the page
     return None
@@ -304,8 +299,6 @@ def _why_not_adopted(report: Mapping[str, Any]) -> str | None:
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:
     """Why a report cannot become a model, and what to do; None if it can."""
-    from underskin.prediction.adopted_model import implausible_d33, not_adopted
-
     why_not = not_adopted(report)
     law = report.get("unnamed")
     if (why_not is None and report["d33"] is None) or (law is not None and law["axis"] in OF_SAMPLES):
@@ -348,34 +341,28 @@ def _done(store: Database, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any], d
 
 def _recorded(store: Database, row: AnyRow) -> str:
     """What the diagnosed recordings are of; empty for several campaigns, which the page lists."""
-    from underskin.diagnosis.reporting.html_report import recorded_in_words
-
     if row.kind != "campaign":
         return ""
     with store.reading() as connection:
         campaign = campaigns.find(connection, row.campaign_id)
         used = [one for one in campaigns.recordings_of(connection, campaign.number) if one.excluded_at is None]
     skin = {**campaign.about["skin"], "id": row.skin_id}
-    return recorded_in_words(skin, [{**one.scalars, "recorded_at": one.recorded_at} for one in used])
+    return html_report.recorded_in_words(skin, [{**one.scalars, "recorded_at": one.recorded_at} for one in used])
 
 
 def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str], recorded: str) -> tuple[Markup, Markup]:
     """The report in the words of the file, with the page's figures, and its origin."""
-    from underskin.diagnosis.reporting import html_report as file
-
     try:
         figures = _drawn(row, report, texts)
         html = {name: render("figure.html", drawn=figure) for name, figure in figures.items()}
-        body = file.body_of(report, html, f"/diagnoses/{row.id}/planned", recorded)
-        provenance = file.provenance(report)
+        body = html_report.body_of(report, html, f"/diagnoses/{row.id}/planned", recorded)
+        provenance = html_report.provenance(report)
     except _ODD:
         _cannot_be_shown(row)
     return Markup(body), Markup(provenance)  # noqa: S704 -- every text in them is escaped where they are made
 
 
 def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> dict[str, Drawn]:
-    from underskin.diagnosis.reporting.html_report import of_report
-
     def numbers(name: str) -> str:
         return f"/diagnoses/{row.id}/{name}.csv"
 
@@ -385,7 +372,9 @@ def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> 
             for name in _ABOUT
             if name in texts
         }
-    return {name: drawn(name, figure, _ABOUT[name], numbers(name)) for name, figure in of_report(report).items()}
+    return {
+        name: drawn(name, figure, _ABOUT[name], numbers(name)) for name, figure in html_report.of_report(report).items()
+    }
 
 
 def _about(name: str, text: str) -> str:

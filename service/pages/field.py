@@ -27,6 +27,7 @@ from service.pages.shared.forms import (
 from service.pages.shared.html import json_answer, page
 from service.pages.shared.skin_values import UNITS, shown
 from underskin.errors import TableError, UnderskinError
+from underskin.figures.stress_field import frames, stress_on_base, stress_section
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter, Skin
 from underskin.physics.hertz import peak_pressure
 from underskin.prediction.answers import STATED, pressed
@@ -93,8 +94,6 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
 @computed_in_turn
 def at_once(request: Request, table: Table) -> Response:
     """What changes in the page while the load grows, a frame for each force, as JSON."""
-    from underskin.figures.stress_field import frames
-
     given = {name: number(name, request.query_params.get(name, "")) for name, *_ in FIELDS}
     field = _computed(table, given, FRAMES, UNITS in request.query_params)
     rows = range(FRAMES) if field.contact.inside.all() else ()
@@ -163,8 +162,6 @@ def _sentences(field: StressField, row: int) -> list[str]:
 
 
 def _figures(field: StressField, query: str) -> Sequence[Drawn]:
-    from underskin.figures.stress_field import stress_on_base, stress_section
-
     numbers = f"/field/section.csv?{query}"
     return [
         drawn(

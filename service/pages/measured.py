@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
@@ -32,14 +32,12 @@ from service.store import Conflict, Database
 from service.usecases.adopted_models import model_in_force
 from service.usecases.pressed_skin import d33
 from underskin.errors import InvalidInput, TableError, UnderskinError, conflicting, noting, required, wrong_type
+from underskin.prediction.adopted_model import AdoptedModel
 from underskin.prediction.answers import other_contact
 from underskin.prediction.pressed_skin import beyond
 from underskin.recordings.validation import Check, declared, not_negative
 from underskin.recordings.validation import number as finite
 from underskin.surrogate.sigma_table import SigmaTable
-
-if TYPE_CHECKING:
-    from underskin.prediction.adopted_model import AdoptedModel
 
 router = APIRouter(prefix="/d33")
 
@@ -116,7 +114,7 @@ def by_model(
         return ByModel(fields, unavailable=in_form_words(refused, _LABELS))
 
 
-def _needed(model: "AdoptedModel", fields: Sequence[tuple[str, str, str, str]]) -> dict[str, Any]:
+def _needed(model: AdoptedModel, fields: Sequence[tuple[str, str, str, str]]) -> dict[str, Any]:
     if model.of_lines:
         names = " and ".join(name.replace("_", " ") for name in model.of_lines)
         raise required("FRF", f"one value is not enough: {names} depends on frequency, so upload recordings")

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import yaml
 from fastapi import APIRouter, Path, Request, Response
@@ -18,11 +18,9 @@ from service.pages.shared.html import page
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses
 from service.usecases import planned_recordings
+from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.wording import axis, in_a_cell, readable
 from underskin.errors import UnderskinError, out_of_range, required
-
-if TYPE_CHECKING:
-    from underskin.diagnosis.planning.rig_limits import RigLimits
 
 router = APIRouter(prefix="/diagnoses/{diagnosis_id}/plan")
 
@@ -215,9 +213,7 @@ def _limits(given: Mapping[str, str]) -> dict[str, Any]:
     return limits
 
 
-def _checked(limits: Mapping[str, Any]) -> "RigLimits":
-    from underskin.diagnosis.planning.rig_limits import RigLimits
-
+def _checked(limits: Mapping[str, Any]) -> RigLimits:
     return RigLimits(**limits)
 
 

@@ -47,7 +47,9 @@ from service.store import (
 )
 from service.usecases import changes, d33_cache
 from service.usecases import skins as usecase
+from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
 from underskin.inversion.array_history import interval
+from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.recordings.readers.text import in_lab
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -104,8 +106,6 @@ def _last_value(of_sensor: SensorHistory | None) -> dict[str, Any]:
     """The last value of a sensor that the latest campaign did not measure."""
     if of_sensor is None or not of_sensor.points:
         return {"reasons": "", "absent": "never measured with FRFs"}
-    from underskin.inversion.mixed_model import SDS_OF_95  # with numerical code, which is slow to import
-
     point = of_sensor.points[-1]
     half = SDS_OF_95 * point.d33_uncertainty_pc_per_n
     return {
@@ -132,8 +132,6 @@ def drawn_map(
     root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By, sensor: str | None
 ) -> Drawn:
     """The sensors of `map_rows` at their positions, one of them chosen; `row`: the campaign of the answer."""
-    from underskin.figures.array_map import Quantity, array_map, disc_size, significance_note
-
     value, uncertainty, name, unit, against = _QUANTITIES[show]
     # With few campaigns a slope's uncertainty is smaller than Student's t allows, so its own test decides.
     significant = tuple(row.get("significant", False) for row in rows) if show == "trend" else None

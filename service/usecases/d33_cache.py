@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import orjson
@@ -18,14 +18,14 @@ from service.usecases.adopted_models import ModelInForce, model_in_force
 from underskin import InvalidInput, TableError
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import left_out_lines
+from underskin.inversion import elastomer
+from underskin.inversion.elastomer import RecordingModulus
+from underskin.inversion.invert import Inversion, array_d33_by_other, invert
+from underskin.inversion.mixed_model import Estimate
+from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import to_lab
-
-if TYPE_CHECKING:
-    from underskin.inversion.elastomer import RecordingModulus
-    from underskin.inversion.invert import Inversion
-    from underskin.inversion.mixed_model import Estimate
 
 logger = logging.getLogger("underskin")
 BandHz = tuple[float, float]
@@ -44,7 +44,7 @@ _NONE: dict[str, Any] = {
 }
 
 
-def of_inversion(inversion: "Inversion") -> dict[str, Any]:
+def of_inversion(inversion: Inversion) -> dict[str, Any]:
     """The fields of `D33` that come from an inversion."""
     zone, cells = inversion.zone, inversion.cells
     array, relative = inversion.absolute_d33, inversion.campaign_d33
@@ -88,12 +88,12 @@ def of_inversion(inversion: "Inversion") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def of_array(estimate: "Estimate | None") -> dict[str, float | None] | None:
+def of_array(estimate: Estimate | None) -> dict[str, float | None] | None:
     """The fields of `D33Value` of one d33."""
     return None if estimate is None else _d33(estimate)[0]
 
 
-def of_moduli(recordings: Sequence["RecordingModulus"]) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+def of_moduli(recordings: Sequence[RecordingModulus]) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
     """The entries of `moduli`, and those of `left_out` for recordings without one."""
     moduli, excluded = [], []
     for recording in recordings:
@@ -112,18 +112,18 @@ def of_moduli(recordings: Sequence["RecordingModulus"]) -> tuple[list[dict[str, 
     return moduli, excluded
 
 
-def _d33(estimate: "Estimate") -> list[dict[str, float | None]]:
+def _d33(estimate: Estimate) -> list[dict[str, float | None]]:
     """The fields of `D33Value` of each entry."""
     return [dict(zip(D33Value.model_fields, map(_finite, row), strict=True)) for row in estimate.d33_rows()]
 
 
-def _scatter(estimate: "Estimate | None", factor: float) -> dict[str, float] | None:
+def _scatter(estimate: Estimate | None, factor: float) -> dict[str, float] | None:
     if estimate is None:
         return None
     return {name: factor * float(getattr(estimate, name)) for name in ("value", "low", "high")}
 
 
-def _flags(inversion: "Inversion", sensor: str) -> list[dict[str, str]]:
+def _flags(inversion: Inversion, sensor: str) -> list[dict[str, str]]:
     return [{"code": flag.code, "reason": flag.reason} for flag in inversion.flags if flag.sensor == sensor]
 
 
@@ -293,7 +293,7 @@ def _computed(
     table: SigmaTable,
     band_hz: BandHz | None,
     excluded: Sequence[tuple[str, str]],
-) -> "tuple[dict[str, Any], Inversion | None, bool]":
+) -> tuple[dict[str, Any], Inversion | None, bool]:
     """The document with the campaign's figures, its inversion if there is one, and whether the computation failed;
     `excluded`: recordings with reasons.
 
@@ -313,14 +313,7 @@ def _computed(
     return full_document, inversion, False
 
 
-def _inverted(
-    campaign: Campaign, table: SigmaTable, band_hz: BandHz | None
-) -> "tuple[dict[str, Any], Inversion | None]":
-    # Imported here: statistics take half a second to load, which a start need not wait for.
-    from underskin.inversion import elastomer
-    from underskin.inversion.invert import invert
-    from underskin.recordings import plausibility
-
+def _inverted(campaign: Campaign, table: SigmaTable, band_hz: BandHz | None) -> tuple[dict[str, Any], Inversion | None]:
     moduli, without_modulus = of_moduli(elastomer.of_campaign(campaign))
     try:
         inversion = invert(campaign, table, band_hz)
@@ -339,10 +332,8 @@ def _inverted(
     return {**of_inversion(inversion), "moduli": moduli, "left_out": excluded + without_modulus}, inversion
 
 
-def _array_solved(campaign: Campaign, table: SigmaTable, inversion: "Inversion") -> dict[str, float | None] | None:
+def _array_solved(campaign: Campaign, table: SigmaTable, inversion: Inversion) -> dict[str, float | None] | None:
     """The field of `D33`; also null if the contact table cannot be read, which is logged."""
-    from underskin.inversion.invert import array_d33_by_other
-
     try:
         return of_array(array_d33_by_other(campaign, table, inversion))
     except TableError as error:

@@ -3,11 +3,12 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 from urllib.parse import quote
 
 import numpy as np
 import orjson
+import plotly.graph_objects as go
 from markupsafe import Markup
 
 from service.pages.shared.assets import LIBRARY, gzipped
@@ -16,11 +17,12 @@ from service.schemas.skins import History, SensorDeparture, SensorHistory
 from service.store import AnyRow
 from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
 from underskin.diagnosis.reporting.page_styles import with_minus
+from underskin.figures.curves import ForceCurve, force_curves
+from underskin.figures.frf import frf_overview, frf_recordings
+from underskin.figures.history import SensorPoints, d33_history, is_summarised
 from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, Recording
+from underskin.recordings.frf import thinned_lines
 from underskin.units import Floats
-
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
 
 CLICK = "Click a sensor to choose it."
 By = Literal["paper", "adopted"]
@@ -40,7 +42,7 @@ class Drawn:
     choices: tuple[str, ...] = ()  # selectable views, the first is the default
 
 
-def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None) -> Drawn:
+def drawn(name: str, figure: go.Figure, about: str, numbers: str | None = None) -> Drawn:
     """For the template's macro `figure`; `about` says what is to be seen."""
     title, height = figure.layout.title.text, figure.layout.height
     return Drawn(name, title, height, json_inside(figure.to_json()), numbers, about)
@@ -48,11 +50,7 @@ def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None
 
 @cache
 def prepare() -> None:
-    """Load the plotting code before the first request for a figure: it takes half a second."""
-    import underskin.figures.campaign_figures
-    from underskin.figures.frf import frf_overview
-
-    assert underskin.figures.campaign_figures
+    """Draw something, and compress the script, before the first request for a figure."""
     frf_overview([], None).to_json()
     gzipped(LIBRARY)
 
@@ -67,8 +65,6 @@ def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -
 def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", numbers: str | None = None) -> list[Drawn]:
     """The first curve recordings in one figure, for a single one its loading and unloading; empty if there are none.
     `noun`: their name."""
-    from underskin.figures.curves import ForceCurve, force_curves
-
     chosen = [recording for recording in recordings if not isinstance(recording, FrfRecording)]
     if not chosen:
         return []
@@ -119,9 +115,6 @@ def drawn_frf(
 ) -> list[Drawn]:
     """Empty where no recording is shown. `loaded`: the campaign with all numbers; `answer`: its d33; `stored_spreads`:
     those of its conditions, if stored; `show`: a sensor or a recording, empty for all."""
-    from underskin.figures.frf import frf_overview, frf_recordings
-    from underskin.recordings.frf import thinned_lines
-
     band = answer["band"]
     zone = None if band is None else (band["low_hz"], band["high_hz"])
     page = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
@@ -160,8 +153,6 @@ def _title(recording: FrfRecording, show: str) -> str:
 
 def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Drawn:
     """d33 over time: of one sensor, of all, or of many the median and the range."""
-    from underskin.figures.history import SensorPoints, d33_history, is_summarised
-
     numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
     points = [
         SensorPoints(

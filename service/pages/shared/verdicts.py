@@ -15,6 +15,7 @@ from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.reporting.headline import first_and_rest
 from underskin.diagnosis.reporting.numbers import is_known
+from underskin.diagnosis.reporting.wording import not_quoted, number
 from underskin.findings.formatting import in_percent
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -115,11 +116,6 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
 
 def _quoted(report: Mapping[str, Any]) -> str:
     """The d33 of a report in words; if it may not be quoted, with the report's reason."""
-    from underskin.diagnosis.reporting.wording import (
-        not_quoted,
-        number,
-    )  # with plotting code, which is slow to import
-
     d33 = report["d33"]
     low, high = number(d33["low"], 3), number(d33["high"], 3)
     if d33.get("quotable", True):

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
 
 from service.ingest.reading import InspectedFile
 from service.pages.shared.figures import Drawn, drawn, drawn_curves
@@ -12,14 +14,16 @@ from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import mapped_file, rig_of
 from service.usecases.figure_data import frf_columns, measured
 from underskin.diagnosis.reporting.page_styles import BOUND, SHOWN
+from underskin.figures.curves import ForceCurve, force_curves
+from underskin.figures.frf import frf_recordings
+from underskin.figures.style import styled
+from underskin.figures.traces import raw_traces
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.curve_preparation import falling
+from underskin.recordings.frf import thinned_lines
 from underskin.recordings.rig_description import RigDescription, Trim
 from underskin.recordings.rig_mapping import MappedFile, range_of
 from underskin.units import LAB, Floats, Indices, Mask, readable_unit
-
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
 
 _COURSE = "course"
 _SHOWN = ("displacement_mm", "force_n", "charge_pc")
@@ -81,11 +85,7 @@ def _to_turn(look: InspectedFile, summary: FileSummary, used: RigDescription) ->
     return () if trimmed is None else counted_negative(trimmed.document["recordings"][0])
 
 
-def _course_figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
-    from plotly.subplots import make_subplots
-
-    from underskin.figures.style import styled
-
+def _course_figure(columns: Mapping[str, Floats], trim: Trim) -> go.Figure:
     count = len(next(iter(columns.values())))
     sample = np.arange(1, count + 1)
     parts = _course_parts(columns, (sample >= (trim.first_sample or 1)) & (sample <= (trim.last_sample or count)))
@@ -155,8 +155,6 @@ def figures(look: InspectedFile, page: str, mapped: MappedFile | None) -> list[D
 
 def _mapped_curves(mapped: MappedFile | None) -> list[Drawn]:
     """Force against displacement as soon as a mapping has both, even without the sphere's radius."""
-    from underskin.figures.curves import ForceCurve, force_curves
-
     recordings = (
         []
         if mapped is None
@@ -202,8 +200,6 @@ def _campaigns(look: InspectedFile) -> list[Campaign]:
 
 
 def _traces(look: InspectedFile, page: str) -> list[Drawn]:
-    from underskin.figures.traces import raw_traces
-
     if look.contents is None or not look.contents.blocks:
         return []
     block = look.contents.blocks[0]
@@ -221,9 +217,6 @@ def _traces(look: InspectedFile, page: str) -> list[Drawn]:
 
 
 def _frf(campaigns: list[Campaign], page: str) -> list[Drawn]:
-    from underskin.figures.frf import frf_recordings
-    from underskin.recordings.frf import thinned_lines
-
     measured_frfs = [recording_frf for campaign in campaigns for recording_frf in measured(campaign)]
     if not measured_frfs:
         return []

@@ -13,6 +13,7 @@ from underskin import InvalidInput
 from underskin.findings.sentences import more_alike
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, Recording, SkinDescription
 from underskin.recordings.channels import Channel, Contents
+from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.frf.spectra import mean_of
 from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.regular_samples import even_rate
@@ -267,8 +268,6 @@ def _measured(recording: Recording) -> RecordingSummary:
 
 
 def _level(recording: FrfRecording) -> float | None:
-    from underskin.recordings.frf.estimation import lines_of
-
     try:
         lines = lines_of(recording)
     except InvalidInput:
