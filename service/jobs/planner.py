@@ -11,7 +11,7 @@ from queue import SimpleQueue
 from typing import Any, Literal
 
 from service.jobs.process import CampaignInput, WorkerProcesses
-from service.jobs.runner import logger
+from service.log import logger
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
 from underskin.diagnosis.planning.rig_limits import RigLimits

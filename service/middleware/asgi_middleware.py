@@ -6,7 +6,6 @@ path, which defines what is valid and the errors.
 """
 
 import itertools
-import logging
 import os
 import re
 import time
@@ -17,14 +16,13 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth.access_control import OPEN, AccessControl, goes_to_disk
-from service.log import KEY
+from service.log import KEY, logger
 from service.middleware.error_handlers import ProblemPage, problem_response
 from service.middleware.http_protocol import OVERLOADED
 from service.middleware.request_log import Answered, record
 from service.problems import RETRY_LATER, Refusal, unexpected
 
 _SHORT_BYTES = 1_000_000  # of each body that are not counted
-logger = logging.getLogger("underskin")
 WITHOUT_CONTENT = "without_content"  # in the scope of a request (HEAD) of whose answer only the headers are sent
 _NUMBERS = frozenset({int, float})
 _LONGEST_HELD = 8  # bodies as large as they may be that are held at once

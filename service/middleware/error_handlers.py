@@ -1,6 +1,5 @@
 """Turns every exception of a route into a problem document."""
 
-import logging
 from collections.abc import Callable, Sequence
 
 from fastapi import FastAPI, Request, Response
@@ -11,6 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import Scope
 
+from service.log import logger
 from service.problems import (
     RETRY_LATER,
     Refusal,
@@ -24,9 +24,6 @@ from service.store.answers import OtherRequest
 from service.store.engine import storage_failure
 from underskin import InvalidInput, TableError
 from underskin.errors import SeveralInvalid
-
-logger = logging.getLogger("underskin")
-
 
 _STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
 

@@ -1,7 +1,6 @@
 """HTTP/1.1 by uvicorn, with limits on the use of memory, time and connections by clients without a key: endless
 headers and trailers, pipelined requests, clients that stop sending or reading, and many connections."""
 
-import logging
 import resource
 import time
 from collections.abc import Iterable, Sized
@@ -13,7 +12,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
-logger = logging.getLogger("underskin")
+from service.log import logger
+
 Limit = Literal["header_size", "idle_headers", "idle_body", "idle_answer", "connections", "pipelining"]
 SPARE = 32  # connections beyond the limit, on which `/health` is answered still
 _FILES = 64  # descriptors of the process that are for other files, the store and other processes

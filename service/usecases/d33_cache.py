@@ -1,6 +1,5 @@
 """d33 of stored campaigns, computed once for each state of a campaign and cached in the store."""
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Literal
@@ -10,6 +9,7 @@ import orjson
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
+from service.log import logger
 from service.problems import Refusal
 from service.schemas.campaign_d33 import D33, D33Value
 from service.store import AnyRow, Conflict, Database, StorageFailed, StoreMoved, campaigns, inversions
@@ -27,7 +27,6 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import to_lab
 
-logger = logging.getLogger("underskin")
 BandHz = tuple[float, float]
 _MOST_NAMED = 3  # reasons for which recordings give no d33
 _PAPER = {"model": "paper", "model_id": None, "model_percent": None}

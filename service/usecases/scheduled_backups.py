@@ -8,7 +8,6 @@ or gone, its disk is missing: none is made in its place, also after a restart, b
 """
 
 import fcntl
-import logging
 import math
 import os
 import re
@@ -23,11 +22,9 @@ from pathlib import Path
 from prometheus_client import Counter, Gauge
 
 from service import durable
-from service.log import first_line
+from service.log import first_line, logger
 from service.store import Database, StorageFailed, StoreError, backup, identity
 from service.usecases import mechanisms
-
-logger = logging.getLogger("underskin")
 
 _PREFIX, _STAMP = "underskin-", "%Y%m%dT%H%M%SZ"
 _NAME = re.compile(rf"{_PREFIX}(\d{{8}}T\d{{6}}Z)\.(?:sqlite3|pgdump)")
