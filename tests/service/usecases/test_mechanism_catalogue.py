@@ -18,10 +18,11 @@ def test_file_removed_catalogue_read_not_shown(tmp_path: Path, monkeypatch: pyte
     file = tmp_path / "warm_amplifier.yaml"
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
     file.write_text(WARM)
+    findings = mechanism_catalogue.findings
 
     def removed(store: Database) -> mechanism_catalogue.Findings:
         file.unlink()
-        return mechanism_catalogue.findings(store)
+        return findings(store)
 
     store = open_store("", tmp_path)
     try:
