@@ -16,9 +16,9 @@ from tests.cli.commands import run
 
 def example() -> Document:
     """That of the service, whose modules take long to load."""
-    from service.routes.stress import EXAMPLE
+    from service.routes.computed import STRESS_EXAMPLE
 
-    return deepcopy(EXAMPLE)
+    return deepcopy(STRESS_EXAMPLE)
 
 
 def map_of(**changes: Any) -> Callable[[Document], None]:
