@@ -348,6 +348,7 @@ def test_drag_of_a_liquid_leaves_the_modulus() -> None:
     assert found.low <= drag <= found.high
 
 
+@pytest.mark.slow
 def test_a_friction_of_the_guide_reads_as_drag_at_one_speed() -> None:
     """A constant force against the motion of a sphere that moves in and back at one speed: E is right, and the drag is
     said to be a possible friction, with its size beside that of water."""

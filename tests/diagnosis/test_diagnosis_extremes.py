@@ -128,6 +128,7 @@ def test_an_impossible_skin_is_named(table: SigmaTable) -> None:
     assert f"skin.{field}" in report["statement"]
 
 
+@pytest.mark.slow
 def test_faint_forces_soft_cantilever_meant(table: SigmaTable) -> None:
     """The faint forces of a soft cantilever are meant."""
     random = np.random.default_rng(3)

@@ -297,6 +297,7 @@ def test_little_expected_silence_kept(table: SigmaTable) -> None:
     assert codes(looked_at(added(far, noise), table)) == {("far_contacts", "", "position_mm")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("spread", "differs"), [(0.009, False), (0.02, True)])
 def test_forces_within_a_percent_are_one_force(spread: float, differs: bool, good: Campaign, table: SigmaTable) -> None:
     """As a shaker without a closed loop gives them."""

@@ -172,6 +172,7 @@ def test_declared_value_off_moves_d33_said(table: SigmaTable) -> None:
     assert invert(campaign, table).declared_percent == pytest.approx(np.linalg.norm(changes), rel=0.1)
 
 
+@pytest.mark.slow
 def test_time_series_inverted_wrong_said(table: SigmaTable) -> None:
     """Time series are inverted and what is wrong with them is said."""
     random = np.random.default_rng(10)
@@ -202,6 +203,7 @@ def test_time_series_inverted_wrong_said(table: SigmaTable) -> None:
     assert found.left_out[0].sentence.startswith("recording r1")
 
 
+@pytest.mark.slow
 @NEEDS_CAMPAIGNS
 def test_concealed_campaigns_nothing_missing(table: SigmaTable) -> None:
     """Concealed campaigns with nothing missing."""

@@ -316,6 +316,7 @@ def test_a_sphere_in_a_well_feels_the_thin_layer() -> None:
         assert np.exp(fit[0]) == pytest.approx(modulus_mpa, rel=0.02)
 
 
+@pytest.mark.slow
 @NEEDS_RECORDINGS
 def test_measured_silicone_nearly_neo_hookean() -> None:
     """Measured silicone is nearly neo hookean and yeoh s."""

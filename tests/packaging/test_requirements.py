@@ -56,6 +56,7 @@ def test_library_requires_imports() -> None:
     assert imported("underskin") - named(EXTRAS["cluster"]) == named(PROJECT["dependencies"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("package", "extras"), [("service", ["server"]), ("tablegen", ["fem", "cluster"]), ("rig", []), ("proof", ["docs"])]
 )
@@ -65,6 +66,7 @@ def test_package_checkout_imports_extra_requires(package: str, extras: list[str]
     assert imported(package) - required(needs) == set()
 
 
+@pytest.mark.slow
 def test_extra_server_requires_used() -> None:
     """The extra of the server requires what is used and no more."""
     assert named(EXTRAS["server"]) - imported("service") - BY_NAME == set()

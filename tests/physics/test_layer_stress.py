@@ -17,7 +17,7 @@ UNIT = 1.5 / np.pi  # of the stresses here, for F = 1 N and h = 1 m
 def _rings(end: float, widest: float) -> tuple[Floats, Floats]:
     """Radii from 0 to `end` with the weights of ∫ … 2πr dr, fine up to `widest`."""
     x, w = np.polynomial.legendre.leggauss(20)
-    edges = np.concatenate([np.linspace(0.0, widest, 61), np.linspace(widest, end, 61)[1:]])
+    edges = np.concatenate([np.linspace(0.0, widest, 31), np.linspace(widest, end, 31)[1:]])
     half = np.diff(edges)[:, None] / 2
     r = (edges[:-1, None] + half * (1 + x)).ravel()
     return r, 2 * np.pi * r * (half * w).ravel()

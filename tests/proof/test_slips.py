@@ -34,6 +34,7 @@ def test_slips_few_campaigns_committed_named() -> None:
     assert all(plain)
 
 
+@pytest.mark.slow
 def test_conjugated_delay_sign() -> None:
     """A conjugated delay is one of the other sign."""
     made = recorded("timing_delay", delay_us=80.0)

@@ -28,7 +28,7 @@ def test_broadband_recovers_known_system_lagging() -> None:
 
 def test_stepped_sine_recovers_known_system() -> None:
     """Stepped sine recovers a known system and its phase."""
-    tones = [1.0, 3.3, 10.0, 31.7, 100.0, 317.0, 700.0]
+    tones = [3.3, 10.0, 31.7, 100.0, 317.0, 700.0]
     force = dwelling(tones)
     frf = stepped_sine(force, answer_to(force), RATE)
     np.testing.assert_allclose(frf.frequency, tones, rtol=1e-4)

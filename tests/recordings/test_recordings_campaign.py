@@ -22,6 +22,7 @@ def test_every_kind_comes_back_as_it_went_in() -> None:
     assert json.loads(json_file.write(campaign)) == EVERYTHING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["open", "sealed"])
 def test_concealed_campaigns_come_back_went(part: str) -> None:
     """The concealed campaigns come back as they went in."""

@@ -64,6 +64,7 @@ def test_silicone_compression() -> None:
         assert low - 0.05 < slope_kpa < high + 0.05  # as the data's source states them, rounded
 
 
+@pytest.mark.slow
 def test_nanoindenters_depth_piezo_less() -> None:
     """The nanoindenters depth is the piezo less the cantilever."""
     (file,) = real("afm-hold/fmt-chiaro*.txt")

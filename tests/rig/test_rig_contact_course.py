@@ -13,6 +13,8 @@ from rig.layer import Floats
 from rig.relaxation import Relaxation
 from rig.sphere import sphere_law
 
+pytestmark = pytest.mark.slow
+
 R, E, DEPTH = 7.5e-3, 1.0, 1.5e-3  # mm, MPa, mm
 W, W_S = 40e-6, 75e-6  # N/mm
 PLANE = E / 0.75

@@ -98,6 +98,7 @@ def test_slow_creep_has_no_memory_left() -> None:
     assert force == pytest.approx(0.6 * hertz(depth), abs=0.02 * float(hertz(1.0)))
 
 
+@pytest.mark.slow
 def test_adhesive_contact_tears_force_johnson() -> None:
     """An adhesive contact tears at the force of johnson kendall and roberts.
 

@@ -14,6 +14,8 @@ from rig.visible_curves import visibility
 from tests.support.repository import ROOT
 from underskin.recordings import campaign as campaigns
 
+pytestmark = pytest.mark.slow
+
 TEXTBOOK = document(ROOT / "examples" / "rig" / "nanoindenter.yaml")
 
 

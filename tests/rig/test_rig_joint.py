@@ -133,6 +133,7 @@ def test_nothing_changes_two_dates_noise() -> None:
     assert not np.array_equal(before.measured[:3], after.measured[:3])
 
 
+@pytest.mark.slow
 def test_ages_said_date_sensors() -> None:
     """What ages is said with its date and its sensors."""
     for number in range(60):
@@ -152,6 +153,7 @@ def test_ages_said_date_sensors() -> None:
     raise AssertionError("nothing ages")
 
 
+@pytest.mark.slow
 def test_skin_departs_few_recordings() -> None:
     """One skin departs and one has few recordings."""
     seen, counts = set(), set()
@@ -212,6 +214,7 @@ def test_fits_deviations_linear_problem_exact() -> None:
     assert least_chi2([Line()], held) == pytest.approx(25 + 6.25, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_command_writes_every_document_refuses(tmp_path: Path) -> None:
     """The command writes every document and refuses what it does not draw."""
     arguments = ["draw", "--output-dir", str(tmp_path), "--count", "1", "--kind", "joint"]

@@ -106,6 +106,7 @@ def test_finite_strain_kept_solver_gives_nodes() -> None:
         assert kept == pytest.approx(solved, abs=2e-5)
 
 
+@pytest.mark.slow
 def test_solver_carries_whole_load_base() -> None:
     """The solver carries the whole load to the base."""
     layer = finite_strain_solve.FiniteStrainLayer(finite_strain_solve.make_mesh(0.6))

@@ -6,6 +6,8 @@ import pytest
 from rig.solved.charge import inside
 from rig.solved.layer import Material, PressedLayer, Sublayer
 
+pytestmark = pytest.mark.slow
+
 _BONDED = (Sublayer(1.0, Material()),)
 EXACT = [(0.1, 1.0008, 0.9258), (0.3, 1.0197, 0.7945), (1.0, 1.4105, 0.5594), (2.0, 2.5981, 0.4549)]
 

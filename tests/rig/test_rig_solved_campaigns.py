@@ -22,6 +22,7 @@ def design_of(number: int, world: World) -> Design:
     return drawn_design(np.random.default_rng([8, number]), world)
 
 
+@pytest.mark.slow
 def test_disc() -> None:
     """At small strain a disc, centred or beside the axis, bears the exact share of the force, and a wide one
     less than the whole by the long tail of an incompressible layer."""

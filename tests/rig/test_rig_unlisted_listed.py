@@ -168,6 +168,7 @@ def test_static_mechanisms_bench_recognised(companion: Companion, name: str) -> 
     assert found[name] < design.count + 4.0 * np.sqrt(2.0 * design.count)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [("timing_delay", (500.0,)), ("amplifier_high_pass", (0.4,)), ("contact_resonance", (1.5, 0.08))],
@@ -184,6 +185,7 @@ def test_spectral_mechanisms_bench_recognised(name: str, parameters: tuple[float
     assert found[name] < freedom + 4.0 * np.sqrt(2.0 * freedom)
 
 
+@pytest.mark.slow
 def test_pick_up_of_the_mains_is_recognised() -> None:
     """A charge of random phase at 50 Hz and its harmonics, larger where the dynamic force is smaller."""
     design = replace(_design(4), frequency_hz=np.array([2.0, 5.0, 10.0, 20.0, 35.0, 49.0, 75.0, 101.0, 125.0, 149.0]))
@@ -236,6 +238,7 @@ def test_companion_catalogue_not_hide_law() -> None:
     assert entry["chi2_gain_over_best_listed"] > 0.7 * entry["chi2_gain_over_base"] > 100.0
 
 
+@pytest.mark.slow
 def test_companion_replaced_mechanism_kept(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -9,6 +9,7 @@ from rig.recorded import record_lines
 from rig.wrong_modulus import drawn_wrong_modulus, wrong_modulus
 
 
+@pytest.mark.slow
 def test_declared_modulus_wrong_factor_two_four() -> None:
     """The declared modulus is wrong by a factor of two to four."""
     factors, kinds = [], set()

@@ -51,6 +51,7 @@ def numbers(row: dict[str, str]) -> tuple[float, float, float, float, float]:
     return poisson_ratio, elastic_layer.slip(2 * float(row["glue_stiffness_h_over_2g"])), rho, offset, value
 
 
+@pytest.mark.slow
 @NEEDS_ORACLE
 @pytest.mark.parametrize("quantity", ["gamma_n", "gamma_t"])
 def test_point_forces_equal_the_oracle(quantity: str) -> None:
@@ -80,6 +81,7 @@ def test_hertz_pressure_beside_sensor_equals() -> None:
     assert_accurate(np.array(found), np.array(exact))
 
 
+@pytest.mark.slow
 def test_every_skin_domain_meets_exact_layer() -> None:
     """Every skin of the domain meets the exact layer within the reported error."""
     r = np.linspace(0, 12, 121)

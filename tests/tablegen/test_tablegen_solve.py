@@ -73,6 +73,7 @@ def test_volume_kept_path_loading_not_matter() -> None:
     assert back.displacement == pytest.approx(direct.displacement, abs=2e-8)
 
 
+@pytest.mark.slow
 def test_surface_sinks_under_contact_base() -> None:
     """The surface sinks under the contact and the base does not move."""
     d = discretise(layer_mesh(0.5), 4)
@@ -126,6 +127,7 @@ def after_newton_step(layer: NonlinearLayer, state: State, load: Floats) -> Stat
     return State(displacement, state.pressure + step[d.free.size :].reshape(state.pressure.shape))
 
 
+@pytest.mark.slow
 def test_change_grows_like_cube_root_load() -> None:
     """Change grows like the cube root of the load.
 
