@@ -37,8 +37,7 @@ def test_exact_layer_summed_over_loads() -> None:
     assert (expected > 0).any()  # the shear pulls somewhere
 
 
-def test_sensor_s_mean_stress_mean_over_disc() -> None:
-    """A sensor s mean stress is the mean over its disc."""
+def test_a_sensors_mean_stress_is_the_mean_over_its_disc() -> None:
     request = read_request(document({**PRESS, "x_mm": 1.0}, {**PRESS, "x_mm": -2.0, "y_mm": 3.0}))
     grid = np.linspace(-1.5, 1.5, 61)
     stress = base_stress(TABLE, request, grid, grid).sigma_zz_mpa

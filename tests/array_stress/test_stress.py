@@ -127,8 +127,7 @@ def test_soft_thick_skin_half_space_walls(http: httpx.Client) -> None:
     assert change == pytest.approx(expected, rel=0.5)
 
 
-def test_pressure_map_gives_contact_gives(http: httpx.Client) -> None:
-    """A pressure map gives what its contact gives."""
+def test_a_pressure_map_gives_what_its_contact_gives(http: httpx.Client) -> None:
     x = np.linspace(6.5, 9.5, 61)
     a = np.cbrt(0.75 * 4.0 * 0.75 / 16.0)
     inside = np.clip(1 - ((x - 8.0) ** 2 + (x[:, None] - 8.0) ** 2) / a**2, 0, None)
@@ -140,8 +139,7 @@ def test_pressure_map_gives_contact_gives(http: httpx.Client) -> None:
     assert found["charge_pc"] == pytest.approx(contact["charge_pc"], rel=1e-3)
 
 
-def test_sensors_no_load_reaches_out_domain(http: httpx.Client) -> None:
-    """Only sensors that no load reaches are out of the domain."""
+def test_only_sensors_that_no_load_reaches_are_out_of_the_domain(http: httpx.Client) -> None:
     far = [{"id": "near", "x_mm": 0.0, "y_mm": 0.0}, {"id": "far", "x_mm": 40.0, "y_mm": 0.0}]
     found = posted(http, document({**PRESS, "x_mm": 0.0}, sensors=far))
     assert found["status"] == ["ok", "out_of_domain"]
@@ -165,8 +163,7 @@ def test_csv_has_a_row_a_sensor(http: httpx.Client) -> None:
     assert [line[0] for line in lines] == names
 
 
-def test_client_command_give_services_numbers(http: httpx.Client, server_url: str, tmp_path: Path) -> None:
-    """Client and command give the services numbers."""
+def test_client_and_command_give_the_services_numbers(http: httpx.Client, server_url: str, tmp_path: Path) -> None:
     request = document(PRESS, {**PRESS, "x_mm": 60.0})
     plain = posted(http, request)
     with Client(server_url) as client:

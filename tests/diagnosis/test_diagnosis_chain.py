@@ -61,10 +61,9 @@ def test_delay_either_sign_size_named(chain: dict[str, Any], delay_us: float, ta
         ],
     ),
 )
-def test_filter_within_band_named_corner_d33(
+def test_a_filter_within_the_band_is_named_with_its_corner_and_d33(
     chain: Any, mechanism: str, parameter: str, corner_hz: float, table: SigmaTable
 ) -> None:
-    """A filter within the band is named with its corner and d33."""
     report = diagnosed(table, charge=chain)
     assert report.verdict == "explained", report.statement
     assert named(report)[mechanism][parameter] == pytest.approx(corner_hz, rel=0.05)

@@ -114,8 +114,7 @@ def test_no_modulus_before_a_relaxation_that_nothing_follows() -> None:
     assert report.verdict == "ambiguous"
 
 
-def test_pulled_strip_told_without_spheres() -> None:
-    """A pulled strip is told of without spheres."""
+def test_a_pulled_strip_is_told_of_without_spheres() -> None:
     strain = -np.linspace(0.0, 2.0, 120)
     stretch = 1 - strain
     stiffens = neo_hookean(strain) * (1 + 0.2 * (stretch**2 + 2 / stretch - 3))
@@ -178,8 +177,7 @@ def test_a_declared_layer_is_no_guess() -> None:
     assert "0.1 of the thickness" in report.statement
 
 
-def test_layer_unknown_thickness_not_told() -> None:
-    """A layer of unknown thickness is not told from stiffening."""
+def test_a_layer_of_unknown_thickness_is_not_told_from_stiffening() -> None:
     depth = ways(-0.05, 0.2, samples=400)
     report = diagnosed(campaign(depth, pressed(depth, bonded_layer(2.0, 2.0)), timed=False))
     assert report.verdict == "ambiguous"
@@ -311,8 +309,7 @@ def test_a_sphere_pressed_deep_lacks_nothing() -> None:
 
 
 @pytest.mark.parametrize("skin", first(1, [{"thickness_mm": 20.0, "youngs_modulus_mpa": 1.0}, {}]))
-def test_flat_punch_stated_sphere_concludes(skin: dict[str, float]) -> None:
-    """A flat punch stated as a sphere concludes nothing."""
+def test_a_flat_punch_stated_as_a_sphere_concludes_nothing(skin: dict[str, float]) -> None:
     depth = ways(-0.1, 0.3, samples=400)
     report = diagnosed(
         campaign(depth, pressed(depth, lambda at: 8 / 3 * at), timed=False, skin=skin, indenter_radius_mm=1.0)
@@ -321,8 +318,7 @@ def test_flat_punch_stated_sphere_concludes(skin: dict[str, float]) -> None:
     assert "flat punch" in report.statement
 
 
-def test_cone_stated_sphere_explains_nothing() -> None:
-    """A cone stated as a sphere explains nothing for certain."""
+def test_a_cone_stated_as_a_sphere_explains_nothing_for_certain() -> None:
     depth = ways(-0.1, 0.3, samples=120)
     curve = campaign(depth, pressed(depth, lambda at: at**2), timed=False, indenter_radius_mm=5.0)
     report = diagnosed(curve)

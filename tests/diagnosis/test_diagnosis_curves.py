@@ -69,8 +69,7 @@ def ways(*ends: float, samples: int = 400) -> Floats:
 @pytest.mark.slow
 @pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS names no folder")
 @pytest.mark.parametrize("name", first(1, ["compression-EF10", "tension-RTV615", "compression-EF50"]))
-def test_silicone_stiffens_not_creep_nothing(name: str, table: SigmaTable) -> None:
-    """Silicone stiffens and does not creep where nothing tells time."""
+def test_silicone_stiffens_and_does_not_creep_where_nothing_tells_time(name: str, table: SigmaTable) -> None:
     (entry,) = [entry for entry in recorded() if entry.name == name]
     report = lean_report(
         parse(entry.make(Path(os.environ["UNDERSKIN_RECORDINGS"]))), table,
@@ -123,10 +122,9 @@ UNLISTED: list[tuple[dict[str, Any], dict[str, float]]] = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("effect", "noisy"), first(1, UNLISTED))
-def test_physics_no_law_describes_unexplained(
+def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_of_it(
     effect: dict[str, Any], noisy: dict[str, float], table: SigmaTable
 ) -> None:
-    """Physics that no law describes is unexplained although a law takes part of it."""
     report = lean_report(made({**RIG, "curves": {**RIG["curves"], **noisy}, "effects": effect}), table, *STICKY)
     assert report["verdict"] == "unexplained"
     assert report["probability"] > 0.9
@@ -158,8 +156,7 @@ def test_known_stiffness_stage_decides_contact(stiffness: float | None) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("samples", "ripple"), first(1, [(360, 5e-3), (1500, 0.0)]))
-def test_plain_least_squares_leaves_scipy_leaves(samples: int, ripple: float, table: SigmaTable) -> None:
-    """Plain least squares leaves what scipy leaves."""
+def test_plain_least_squares_leaves_what_scipy_leaves(samples: int, ripple: float, table: SigmaTable) -> None:
     random = np.random.default_rng(4)
     displacement = np.linspace(-0.1, 0.4, samples)
     depth = np.maximum(displacement - 0.02, 0.0)
@@ -269,8 +266,7 @@ def test_a_strip_is_called_softer_only_where_it_is(table: SigmaTable) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", first(1, [1, 2]))
-def test_seating_platen_no_stiffening_stiffening(seed: int, table: SigmaTable) -> None:
-    """A seating platen is no stiffening and stiffening no seat."""
+def test_a_seating_platen_is_no_stiffening_and_stiffening_no_seat(seed: int, table: SigmaTable) -> None:
     curves = {
         "heights_mm": [10.0], "diameters_mm": [20.0], "largest_displacement_mm": 1.0, "samples": 120, "repeats": 3,
         "force_noise_n": 0.1, "contact_point_mm": 0.03, "modulus_declared": False,

@@ -119,8 +119,7 @@ def test_thickness_centred_presses_not_show(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.15])
-def test_presses_beside_sensors_tell_thickness(factor: float, table: SigmaTable) -> None:
-    """Presses beside the sensors tell the thickness and d33."""
+def test_presses_beside_the_sensors_tell_the_thickness_and_d33(factor: float, table: SigmaTable) -> None:
     found = reported(BESIDE, factor, [4.0, 10.0], table, *DECLARED)
     assert [entry["name"] for entry in found["mechanisms"]] == (["thickness_error"] if factor != 1.0 else [])
     assert found["d33"]["low"] < D33 < found["d33"]["high"]

@@ -44,8 +44,7 @@ def test_exchanged_labels_contradict_the_places(good: Campaign, table: SigmaTabl
     require_put_right(changed(two, exchanged("s0", "s1")), two, table, "'s0' and 's1'", "labels")
 
 
-def test_exchange_shows_nowhere_contact_sensor(good: Campaign, table: SigmaTable) -> None:
-    """An exchange shows nowhere where each contact is on its own sensor."""
+def test_an_exchange_shows_nowhere_where_each_contact_is_on_its_own_sensor(good: Campaign, table: SigmaTable) -> None:
     centred = changed(good, lambda entry, _: replace(entry, position_mm=None))
     assert named(changed(centred, exchanged("s0", "s2")), table) == []
 

@@ -201,16 +201,14 @@ def test_sensors_in_other_units_are_named(factor: float, good: Campaign, table: 
     assert {field for _, _, field in codes(report)} <= {"skin.sensors", "skin.sensor_radius_mm"}
 
 
-def test_offsets_metres_sensor_named(table: SigmaTable) -> None:
-    """Offsets in metres at the only sensor are named."""
+def test_offsets_in_metres_at_the_only_sensor_are_named(table: SigmaTable) -> None:
     made = campaign(Made(sensors=1, offsets_mm=(0.0, 1.0, 2.0), lines=8), table)
     report = looked_at(changed(made, away(1e-3), of_all), table)
     assert ("units_off_by_1000", "", "position_mm") in codes(report)
     assert report["verdict"] == "insufficient_data"
 
 
-def test_recordings_refused_said(good: Campaign, table: SigmaTable) -> None:
-    """Recordings that were all refused are said to be."""
+def test_recordings_that_were_all_refused_are_said_to_be(good: Campaign, table: SigmaTable) -> None:
     document = to_dict(changed(good, times(1e3, "indenter_radius_mm"), of_all))
     read, refused = from_dict(document)
     report = underskin.diagnose(Reading(read, refused, []), table)
@@ -227,8 +225,7 @@ def test_copies_are_found_through_rounding(good: Campaign, table: SigmaTable) ->
     assert report["d33"] == looked_at(good, table)["d33"]
 
 
-def test_recordings_made_alike_frequency_tell(table: SigmaTable) -> None:
-    """Recordings made alike at one frequency tell nothing."""
+def test_recordings_made_alike_at_one_frequency_tell_nothing(table: SigmaTable) -> None:
     alike = campaign(Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,), repeats=6, lines=1), table)
     entries = [replace(entry, load_cycles=1, dwell_s=1.0, recorded_at=None) for entry in alike.recordings]
     report = looked_at(replace(alike, recordings=tuple(entries)), table)
@@ -237,8 +234,7 @@ def test_recordings_made_alike_frequency_tell(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize("factor", [1e3, -1.0])
-def test_three_recordings_off_named_two_neither(factor: float, table: SigmaTable) -> None:
-    """Of three recordings the one that is off is named and of two neither."""
+def test_of_three_recordings_the_one_that_is_off_is_named_and_of_two_neither(factor: float, table: SigmaTable) -> None:
     made = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.5, 1.0, 2.0)), table)
     wrong = changed(made, times(factor, *LINES), lambda entry: entry.id == "r1")
     code = "units_off_by_1000" if factor > 0 else "sign_flipped"
@@ -333,8 +329,7 @@ def test_bands_stamps_meant_no_slips(table: SigmaTable) -> None:
         assert report["verdict"] != "insufficient_data"
 
 
-def test_places_rounding_leaves_zero_meant(table: SigmaTable) -> None:
-    """Places that rounding leaves where zero is meant are no impossible numbers."""
+def test_places_that_rounding_leaves_where_zero_is_meant_are_no_impossible_numbers(table: SigmaTable) -> None:
     made = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40), table)
     places = np.arange(-0.6, 0.7, 0.2)[2:5]
     assert 0 < abs(places[1]) < 1e-15

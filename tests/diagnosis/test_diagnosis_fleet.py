@@ -88,10 +88,9 @@ def test_skins_depart_named_quantity_tell(
             assert own["low"] < truth < own["high"], (parameter, skin)
 
 
-def test_statement_tells_departures_words_skins(
+def test_the_statement_tells_departures_in_words_and_of_which_skins_d33_may_be_quoted(
     departing: dict[str, Any],
 ) -> None:
-    """The statement tells departures in words and of which skins d33 may be quoted."""
     statement = departing["statement"]
     assert "One departs, weak, in d33: " in statement
     assert "one departs, soft, in Young's modulus: " in statement
@@ -100,8 +99,7 @@ def test_statement_tells_departures_words_skins(
     assert "no skin's own" in statement
 
 
-def test_skin_stands_band_population(departing_and_page: tuple[dict[str, Any], str]) -> None:
-    """Each skin stands on the band of its population."""
+def test_each_skin_stands_on_the_band_of_its_population(departing_and_page: tuple[dict[str, Any], str]) -> None:
     fleet, page = departing_and_page
     figure, d33 = figures_in(page)["population"], population(fleet, "d33")
     band = figure.layout.shapes[0]

@@ -78,8 +78,7 @@ def test_curves_tell_wrong_modulus_frfs_alone(
     assert "A compressed block" not in ((together["next_experiment"] or {}).get("statement") or "")
 
 
-def test_acts_block_alone_named_beside_frfs(table: SigmaTable) -> None:
-    """What acts on the block alone is named beside the frfs."""
+def test_what_acts_on_the_block_alone_is_named_beside_the_frfs(table: SigmaTable) -> None:
     blocks = {**BLOCK, "heights_mm": [4, 12], "diameters_mm": [20, 20]}
     rubbed = curves("compression", blocks, effects={"platen_friction": {"friction": 0.6}})
     document = report(lines(), rubbed, table, *DECLARED)
@@ -92,8 +91,7 @@ def test_acts_block_alone_named_beside_frfs(table: SigmaTable) -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("friction", [0.3, 0.0, 0.8])
-def test_modulus_holds_whatever_friction_samples(friction: float, table: SigmaTable) -> None:
-    """A modulus holds whatever friction samples of one shape hide."""
+def test_a_modulus_holds_whatever_friction_samples_of_one_shape_hide(friction: float, table: SigmaTable) -> None:
     blocks = curves("compression", BLOCK, effects={"platen_friction": {"friction": friction}} if friction else {})
     document = report(lines(), blocks, table, *DECLARED)
     assert (document["verdict"], document["contradictions"]) == ("no_mismatch", [])
@@ -119,8 +117,7 @@ def test_wrong_modulus_found_beside_curves_show(table: SigmaTable) -> None:
     assert told["low"] < 9.0 < told["high"]
 
 
-def test_indentation_tells_adhesion_frfs_not_see(table: SigmaTable) -> None:
-    """An indentation tells the adhesion that frfs do not see."""
+def test_an_indentation_tells_the_adhesion_that_frfs_do_not_see(table: SigmaTable) -> None:
     sticky = {"adhesion": {"work_j_per_m2": 2.0}}
     measured = lines(effects=sticky)
     assert report(measured, [], table, *STICKY)["verdict"] == "no_mismatch"
@@ -148,8 +145,7 @@ def test_stiffening_block_skins_although_frfs(law: str, coefficient: float, dept
     assert told["high"] / told["low"] < 2.0
 
 
-def test_block_elastomer_contradicts(exact: dict[str, Any], table: SigmaTable) -> None:
-    """A block of another elastomer contradicts."""
+def test_a_block_of_another_elastomer_contradicts(exact: dict[str, Any], table: SigmaTable) -> None:
     document = report(exact, curves("compression", BLOCK, 48.0), table, *DECLARED)
     (contradiction,) = document["contradictions"]
     assert contradiction["kinds"] == ["frf", "compression"]

@@ -103,10 +103,9 @@ def relaxing(quiet: Campaign) -> Campaign:
 
 
 @pytest.mark.parametrize("excited", [struck, relaxing])
-def test_neither_blow_nor_drift_force_slip(
+def test_neither_a_blow_nor_drift_of_the_force_is_a_slip(
     excited: Callable[[Campaign], Campaign], quiet: Campaign, table: SigmaTable
 ) -> None:
-    """Neither a blow nor drift of the force is a slip."""
     right = excited(quiet)
     assert "units_off_by_1000" not in {code for code, _, _ in codes(looked_at(right, table))}
     report = looked_at(times(right, "force_n", 1e-3), table)
@@ -114,8 +113,7 @@ def test_neither_blow_nor_drift_force_slip(
     assert report["verdict"] == "insufficient_data"
 
 
-def test_force_said_right_used(quiet: Campaign, table: SigmaTable) -> None:
-    """A force said to be right is used all the same."""
+def test_a_force_said_to_be_right_is_used_all_the_same(quiet: Campaign, table: SigmaTable) -> None:
     slipped = times(quiet, "dynamic_force_n", 1e-3)
     assert looked_at(slipped, table)["verdict"] == "insufficient_data"
     meant = looked_at(replace(slipped, units_checked=True), table)

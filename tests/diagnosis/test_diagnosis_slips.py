@@ -158,8 +158,7 @@ def test_two_ranges_leave_d33_open(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize(("share", "word"), first(2, [(0.75, "weak"), (2.0, "strong"), (1.35, "strong")]))
-def test_sensor_stands_alone_fault_no_physics(share: float, word: str, table: SigmaTable) -> None:
-    """A sensor that stands alone is its own fault and no physics."""
+def test_a_sensor_that_stands_alone_is_its_own_fault_and_no_physics(share: float, word: str, table: SigmaTable) -> None:
     six = campaign(Made(sensors=6), table)
     report = looked_at(changed(six, lambda entry, _: times(entry, share if entry.sensor == "s3" else 1.0)), table)
     ((code, statement),) = slips(report)
@@ -187,8 +186,7 @@ def test_sensors_differ_none_stands_alone(table: SigmaTable) -> None:
 @pytest.mark.parametrize(
     ("factor", "meant"), first(2, [(2.0, "peak-to-peak"), (0.5**0.5, "rms"), (0.5, "peak-to-peak"), (2**0.5, "rms")])
 )
-def test_amplitudes_kind_put_right(factor: float, meant: str, good: Campaign, table: SigmaTable) -> None:
-    """Amplitudes of another kind are put right."""
+def test_amplitudes_of_another_kind_are_put_right(factor: float, meant: str, good: Campaign, table: SigmaTable) -> None:
     report = looked_at(changed(good, by(a_third(len(good.recordings), factor))), table)
     ((code, statement),) = slips(report)
     assert code == "gain_steps"
@@ -261,8 +259,7 @@ def test_a_warm_up_is_left_out(amplitude: float, good: Campaign, table: SigmaTab
     assert report["d33"]["low"] < 15.0 < report["d33"]["high"]
 
 
-def test_warm_up_told_few_recordings_no_drift(good: Campaign, table: SigmaTable) -> None:
-    """A warm up is told of few recordings and no drift of a few percent."""
+def test_a_warm_up_is_told_of_few_recordings_and_no_drift_of_a_few_percent(good: Campaign, table: SigmaTable) -> None:
     made = shuffled(good)
     for count, recordings in ((6, 1.5), (10, 2.0)):
         few = replace(made, recordings=made.recordings[:count])

@@ -185,8 +185,7 @@ def test_several_answers_left_d33_averaged_none(table: SigmaTable) -> None:
         assert not report["d33"]["quotable"]
 
 
-def test_d33_pvdf_cannot_called(table: SigmaTable) -> None:
-    """A d33 that pvdf cannot have is called so."""
+def test_a_d33_that_pvdf_cannot_have_is_called_so(table: SigmaTable) -> None:
     report = looked_at(campaign(Made(d33_pc_per_n=400.0), table), table)
     assert report["verdict"] == "no_mismatch"
     (finding,) = (entry for entry in report["findings"] if entry["code"] == "implausible_d33")
@@ -230,8 +229,7 @@ def test_each_dead_sensor_is_named(table: SigmaTable) -> None:
     assert "further findings: 2 of no response" in report["statement"]
 
 
-def test_left_out_explained_campaign_stands_head(table: SigmaTable) -> None:
-    """What is left out of an explained campaign stands at the head of its statement."""
+def test_what_is_left_out_of_an_explained_campaign_stands_at_the_head_of_its_statement(table: SigmaTable) -> None:
     made = campaign(Made(mechanisms=("contact_resonance",), parameters=(40.0, 0.05), highest_hz=400.0, lines=40), table)
     silent = replace(frf_recordings(made)[0], frf_re_pc_per_n=np.zeros(40), frf_im_pc_per_n=np.zeros(40))
     report = lean_report(replace(made, recordings=(silent, *made.recordings[1:])), table, *OF_LINES)

@@ -82,8 +82,7 @@ def warming_report(warming: Campaign, table: SigmaTable) -> dict[str, Any]:
 
 
 @pytest.mark.soak
-def test_column_lab_added_gain_follows(warming_report: dict[str, Any]) -> None:
-    """A column that the lab added is what the gain follows."""
+def test_a_column_that_the_lab_added_is_what_the_gain_follows(warming_report: dict[str, Any]) -> None:
     law = warming_report["unnamed"]
     assert warming_report["verdict"] == "unexplained"
     assert warming_report["mechanisms"] == []
@@ -151,9 +150,7 @@ def test_followed_order_confirmed_repeating(quiet: Campaign, table: SigmaTable) 
     assert {"order", "recorded_at"}.isdisjoint(planned["recordings"][0])
 
 
-def test_resonance_frame_peak_over_frequency(quiet: Campaign, table: SigmaTable) -> None:
-    """A resonance of the frame is a peak over frequency."""
-
+def test_a_resonance_of_the_frame_is_a_peak_over_frequency(quiet: Campaign, table: SigmaTable) -> None:
     def frame(_: FrfRecording, __: int, frequency: Floats) -> Complexes:
         u = frequency / 150.0
         return np.asarray(1 + 0.1 * u**2 / (1 - u**2 + 0.1j * u))
@@ -165,8 +162,7 @@ def test_resonance_frame_peak_over_frequency(quiet: Campaign, table: SigmaTable)
     assert values["damping"]["value"] == pytest.approx(0.05, rel=0.2)
 
 
-def test_loss_follows_amplitude_lag(table: SigmaTable) -> None:
-    """A loss that follows the amplitude is a lag."""
+def test_a_loss_that_follows_the_amplitude_is_a_lag(table: SigmaTable) -> None:
     made = campaign(Made(sensors=3, dynamic_forces_n=(0.03, 0.06, 0.12), lines=16), table)
     report = reported(changed(made, lambda entry, _, __: complex(np.exp(-2j * entry.dynamic_force_n))), table)
     acts_on, axis, form = law_of(report)
@@ -234,8 +230,7 @@ def test_shares_among_laws_course_no_form(table: SigmaTable) -> None:
     assert "more probable still is a course of no listed form" in found["statement"]
 
 
-def test_high_pass_order_said(quiet: Campaign, table: SigmaTable) -> None:
-    """A high pass of another order is said to be one."""
+def test_a_high_pass_of_another_order_is_said_to_be_one(quiet: Campaign, table: SigmaTable) -> None:
     report = reported(changed(quiet, lambda _, __, hz: np.asarray((1 / (1 - 2j / hz)) ** 0.4, complex)), table)
     law = report["unnamed"]
     assert law_of(report) == ("frequency_response", "frequency_hz", "threshold")

@@ -18,8 +18,7 @@ pytestmark = pytest.mark.soak  # as all that the paper needs
 PAPER_LENGTH, PAPER_WIDTH = 16.0, 8.0  # 40 mm and 20 mm in units of 2.5 mm
 
 
-def test_deep_layer_lies_layer_half_space() -> None:
-    """The deep layer lies between the layer and the half space."""
+def test_the_deep_layer_lies_between_the_layer_and_the_half_space() -> None:
     np.testing.assert_allclose(deep_layer.sigma(1.0, A, RHO), linear_layer.sigma(A, RHO), rtol=1e-9)
     np.testing.assert_allclose(deep_layer.sigma(200.0, A, RHO), half_space.sigma(A, RHO), rtol=1e-4)
 
@@ -60,8 +59,7 @@ def test_error_falls_order_elements() -> None:
 
 
 @pytest.mark.parametrize("depth", first(1, [1.0, 12.0]))
-def test_papers_block_converges_carries_whole(depth: float) -> None:
-    """The papers block converges and carries the whole force."""
+def test_the_papers_block_converges_and_carries_the_whole_force(depth: float) -> None:
     block = FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, depth)
     coarse, fine = solve(block, A, RHO, order=4), solve(block, A, RHO, order=5)
     assert fine.force == pytest.approx(1.0, abs=1e-8)

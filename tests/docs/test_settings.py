@@ -19,8 +19,7 @@ def rows(section: str) -> dict[str, str]:
     return dict(re.findall(r"^\| `([^`]+)` \| (.+) \|$", SECTIONS[section], flags=re.MULTILINE))
 
 
-def test_every_setting_documented_default() -> None:
-    """Every setting is documented with its default."""
+def test_every_setting_is_documented_with_its_default() -> None:
     documented = {name: section for name, section in SECTIONS.items() if name.startswith("`")}
     for name, field in Settings.model_fields.items():
         section = documented.pop(f"`UNDERSKIN_{name.upper()}`")

@@ -64,8 +64,7 @@ def test_turn_filter_not_stated_delay(table: SigmaTable) -> None:
     assert FindingCode.BEHIND_FILTER in codes(inversion)
 
 
-def test_inverted_sensor_told_whatever_delay(table: SigmaTable) -> None:
-    """An inverted sensor is told whatever the delay."""
+def test_an_inverted_sensor_is_told_whatever_the_delay(table: SigmaTable) -> None:
     turned = invert(shaken(charge=lambda f: -delayed(20e-3)(f)), table)
     assert array_d33(turned)[0] == pytest.approx(-D33, rel=0.02)
 

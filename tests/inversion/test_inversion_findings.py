@@ -98,8 +98,7 @@ def test_whole_arrays_are_seldom_accused(table: SigmaTable) -> None:
         (-1.0, "is the sign of charge or force"),
     ],
 )
-def test_slip_whole_array_shows_finding(table: SigmaTable, factor: float, asks: str) -> None:
-    """A slip that the whole array shows is a finding."""
+def test_a_slip_that_the_whole_array_shows_is_a_finding(table: SigmaTable, factor: float, asks: str) -> None:
     campaign = simulate(table, Rig(d33=np.full(3, 14.0)), np.random.default_rng(7))
     assert invert(campaign, table).findings == ()
     slipped = campaign
@@ -111,8 +110,7 @@ def test_slip_whole_array_shows_finding(table: SigmaTable, factor: float, asks: 
 
 
 @pytest.mark.parametrize("x_mm", [19.0, 1e308])
-def test_recording_far_off_sensor_costs_itself(table: SigmaTable, x_mm: float) -> None:
-    """A recording far off its sensor costs only itself."""
+def test_a_recording_far_off_its_sensor_costs_only_itself(table: SigmaTable, x_mm: float) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(11))
     found = invert(moved(campaign, 0, position_mm=(x_mm, 0.0)), table)
     rest = invert(replace(campaign, recordings=campaign.recordings[1:]), table)
@@ -124,8 +122,7 @@ def test_recording_far_off_sensor_costs_itself(table: SigmaTable, x_mm: float) -
 
 
 @pytest.mark.parametrize(("sensors", "factor"), [(1, 10.0), (5, 1000.0), (1, -1.0), (5, 1e-3)])
-def test_recording_grossly_off_set_aside_named(table: SigmaTable, sensors: int, factor: float) -> None:
-    """A recording grossly off is set aside and named."""
+def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, sensors: int, factor: float) -> None:
     rig = Rig(d33=np.full(sensors, 14.0), preloads_n=(0.5, 2.0))
     campaign = simulate(table, rig, np.random.default_rng(13))
     found = invert(scaled(campaign, 0, factor), table)
@@ -223,8 +220,7 @@ def test_a_sensor_of_exact_zeros_is_dead(table: SigmaTable) -> None:
 
 
 @pytest.mark.slow
-def test_force_mean_contradicts_preload_finding(table: SigmaTable) -> None:
-    """A force whose mean contradicts the preload is a finding."""
+def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTable) -> None:
     random = np.random.default_rng(18)
     campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(1.0,)), random)
 
@@ -377,8 +373,7 @@ def test_zeros_outside_analyzers_band(table: SigmaTable) -> None:
     assert found.findings == ()
 
 
-def test_exchanged_channels_force_charge_give(table: SigmaTable) -> None:
-    """Exchanged channels of force and charge give no d33."""
+def test_exchanged_channels_of_force_and_charge_give_no_d33(table: SigmaTable) -> None:
     random = np.random.default_rng(21)
     campaign = simulate(table, Rig(d33=np.array([14.0])), random)
     recording = campaign.recordings[0]

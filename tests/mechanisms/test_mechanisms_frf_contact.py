@@ -56,8 +56,7 @@ def test_contact_wider_table_continued_wide() -> None:
         assert level([], linear_contact(a)).real == pytest.approx(float(exact), rel=allowed)
 
 
-def test_contact_wider_table_derivative() -> None:
-    """A contact wider than the table has the derivative of its continuation."""
+def test_a_contact_wider_than_the_table_has_the_derivative_of_its_continuation() -> None:
     model = compose(["modulus_error"], campaign([linear_contact(3.5)]), table())
     fit = np.array([entry.start for entry in model.parameters])
     step = np.zeros_like(fit)
@@ -76,8 +75,7 @@ def test_half_a_moving_edge_is_half_way() -> None:
 
 
 @NEEDS_ORACLE
-def test_layered_contact_layer_s_radius_pressure() -> None:
-    """A layered contact has the layer s radius and pressure."""
+def test_a_layered_contact_has_the_layers_radius_and_pressure() -> None:
     for row in sphere_on_layer():
         a = row["a_over_h"]
         on_half_space = linear_contact(a)
@@ -118,8 +116,7 @@ def test_adhesion_is_jkr_on_the_half_space() -> None:
     assert found.real == pytest.approx(float(expected + strain), rel=1e-5)
 
 
-def test_adhesion_layer_together_jkr_layer() -> None:
-    """Adhesion and layer together are jkr on the layer."""
+def test_adhesion_and_layer_together_are_jkr_on_the_layer() -> None:
     w, recording = 0.3, frf_recording(preload_n=0.2)
     contact = SphereOnLayer(4e-3, E, H, Layer(), work_of_adhesion=w).at_force(0.2)
     a = contact.contact_radius / H
@@ -175,8 +172,7 @@ def test_held_contact_creeps_solid_modulus(fraction: float) -> None:
         assert crept[0] == pytest.approx(softer[0], rel=1e-5)
 
 
-def test_fast_oscillation_meets_unrelaxed() -> None:
-    """A fast oscillation meets the unrelaxed modulus on the contact that crept."""
+def test_a_fast_oscillation_meets_the_unrelaxed_modulus_on_the_contact_that_crept() -> None:
     recordings = [frf_recording(dwell_s=1e6), frf_recording(id="other", dwell_s=0.0)]
     names = ["contact_creep", "contact_resonance"]
     crept = predicted(names, campaign(recordings), relaxed_fraction=0.4, relaxation_time=30.0, tip_mass=20.0)
@@ -185,9 +181,7 @@ def test_fast_oscillation_meets_unrelaxed() -> None:
     assert crept[: len(grown)] == pytest.approx(grown, rel=1e-9)
 
 
-def test_stiffening_contact_solves_strain() -> None:
-    """A stiffening contact solves its own strain."""
-
+def test_a_stiffening_contact_solves_its_own_strain() -> None:
     def misfit(factor: float) -> float:
         a = float(hertz.contact_radius(2.0, 4e-3, E * factor))
         return 1 + 5.0 * 0.2 * a / 4e-3 - factor

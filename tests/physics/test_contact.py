@@ -87,8 +87,7 @@ def test_a_thick_layer_gives_hertz() -> None:
         assert contact.stiffness == pytest.approx(1.5 * 0.5 / contact.indentation, rel=1e-8)
 
 
-def test_thick_layer_gives_johnson_kendall() -> None:
-    """A thick layer gives johnson kendall roberts."""
+def test_a_thick_layer_gives_johnson_kendall_roberts() -> None:
     work, body = 0.05, Layer(0.3)
     setup = SphereOnLayer(RADIUS, MODULUS, DEEP, body, work)
     modulus = setup.plane_modulus

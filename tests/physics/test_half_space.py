@@ -10,8 +10,7 @@ from underskin.physics import half_space, hertz
 RADII = np.array([0.0, 0.1, 0.5, 1.0, 3.0, 10.0])
 
 
-def test_point_force_point_sensor_boussinesq() -> None:
-    """Point force on a point sensor is boussinesq."""
+def test_point_force_on_a_point_sensor_is_boussinesq() -> None:
     assert half_space.gamma_n(RADII, 0.0) == pytest.approx((1 + RADII**2) ** -2.5, abs=1e-13)
     assert half_space.gamma_t(RADII, 0.0) == pytest.approx(RADII * (1 + RADII**2) ** -2.5, abs=1e-13)
 
@@ -22,8 +21,7 @@ def test_point_force_over_a_centred_disc() -> None:
     assert half_space.gamma_n(0.0, rho) == pytest.approx(exact, rel=1e-12)
 
 
-def test_hertz_pressure_point_sensor_delta() -> None:
-    """Hertz pressure on a point sensor is delta."""
+def test_hertz_pressure_on_a_point_sensor_is_delta() -> None:
     assert half_space.sigma(RADII, 0.0) == pytest.approx(half_space.delta(RADII), rel=1e-11)
 
 

@@ -55,8 +55,7 @@ def test_every_row_of_the_oracle(quantity: str, layers: int) -> None:
         assert found == pytest.approx(value, abs=2e-8), body
 
 
-def test_incompressible_bonded_layer_closed_form() -> None:
-    """The incompressible bonded layer has its closed form."""
+def test_the_incompressible_bonded_layer_has_its_closed_form() -> None:
     assert Layer().transmission(K).value == pytest.approx(linear_layer.transmission(K), rel=1e-13)
     k = K[2:-1]
     closed = (np.sinh(2 * k) - 2 * k) / (1 + 2 * k**2 + np.cosh(2 * k))
@@ -85,8 +84,7 @@ def test_small_wave_numbers() -> None:
         assert body.transmission(k).value == pytest.approx(1.0, abs=1e-6)
 
 
-def test_nothing_overflows_thick_layer_half() -> None:
-    """Nothing overflows and a thick layer is a half space."""
+def test_nothing_overflows_and_a_thick_layer_is_a_half_space() -> None:
     k = np.array([0.0, 60.0, 800.0, 1e5])
     for body in LAYERS:
         for name in FUNCTIONS:

@@ -44,14 +44,12 @@ def test_the_pressure_is_reached_continuously() -> None:
 
 
 @pytest.mark.parametrize("poisson_ratio", RATIOS)
-def test_base_bears_transform_layer_gives(poisson_ratio: float) -> None:
-    """The base bears what the transform of the layer gives."""
+def test_the_base_bears_what_the_transform_of_the_layer_gives(poisson_ratio: float) -> None:
     base = layer_stress(poisson_ratio, A, R, np.ones(1))[:, 0]
     assert base == pytest.approx(elastic_layer.sigma(Layer(poisson_ratio), A[:, None], 0.0, R), abs=1e-11)
 
 
-def test_transmission_surface_base_ends() -> None:
-    """The transmission is that of surface and base at the ends."""
+def test_the_transmission_is_that_of_surface_and_base_at_the_ends() -> None:
     k = np.array([1e-4, 0.1, 1.0, 5.0, 30.0])
     for poisson_ratio in RATIOS:
         surface, base = depth_transmission(poisson_ratio, k, np.array([0.0, 1.0]))
@@ -70,8 +68,7 @@ def test_closed_form_half_space_transform() -> None:
         assert closed == pytest.approx(integral, rel=1e-8, abs=1e-10)
 
 
-def test_point_force_half_space_boussinesq_s() -> None:
-    """A point force on the half space is boussinesq s."""
+def test_a_point_force_on_the_half_space_is_boussinesqs() -> None:
     depth = np.array([0.2, 0.5, 1.0])
     expected = depth[:, None] ** 3 / (R**2 + depth[:, None] ** 2) ** 2.5
     assert half_space_stress(np.array([1e-4]), R, depth)[0] == pytest.approx(expected, rel=1e-6)

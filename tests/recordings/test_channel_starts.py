@@ -70,8 +70,7 @@ def test_channels_are_aligned_by_their_starts(late_us: int, offset_s: float) -> 
     )
 
 
-def test_starts_cannot_aligned_refused_times() -> None:
-    """Starts that cannot be aligned are refused with both times."""
+def test_starts_that_cannot_be_aligned_are_refused_with_both_times() -> None:
     with pytest.raises(
         FileError, match=r"'Force' starts at .*T10:00:00Z, 'Charge' at .*T10:00:00\.003400Z: .*3\.4 samples"
     ):

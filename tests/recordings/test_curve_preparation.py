@@ -271,8 +271,7 @@ def test_a_held_load_is_no_saturation(creep: float) -> None:
     assert "force_saturates" not in [one.code for one in implausible(campaign(depth, force))]
 
 
-def test_steps_converter_hold_no_saturation() -> None:
-    """Steps of a converter and a hold are no saturation."""
+def test_steps_of_a_converter_and_a_hold_are_no_saturation() -> None:
     depth = ways(-0.1, 0.3, 0.3, -0.1)
     steps = hertz(np.array(0.3)) / 60
     assert implausible(campaign(depth, np.round(pressed(depth) / steps) * steps)) == []

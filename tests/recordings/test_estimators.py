@@ -45,8 +45,7 @@ def factor(in_force: float, in_charge: float, estimator: Estimator) -> Floats:
     return np.abs(frf.values[low] / known_frf(frf.frequency[low]))
 
 
-def test_noise_charge_makes_h2_too_large_h1() -> None:
-    """Noise in the charge makes h2 too large and h1 not."""
+def test_noise_in_the_charge_makes_h2_too_large_and_h1_not() -> None:
     assert np.mean(factor(0, NOISE, "H1")) == pytest.approx(1, abs=0.005)
     frequency = (RATE * np.fft.rfftfreq(1000)[1:]).astype(np.float64)
     power = np.abs(known_frf(frequency)) ** 2
@@ -137,8 +136,7 @@ def estimated(recording: FrfRecording) -> Floats:
     return np.abs(lines_of(recording).values)
 
 
-def test_estimator_stays_recording_json_hdf5() -> None:
-    """The estimator stays with the recording in json hdf5 and the template."""
+def test_the_estimator_stays_with_the_recording_in_json_hdf5_and_the_template() -> None:
     campaign, _ = from_dict(document({**RECORDING, "estimator": "Hv"}))
     assert to_dict(campaign)["recordings"][0]["estimator"] == "Hv"
     buffer = io.BytesIO()
@@ -164,8 +162,7 @@ def test_estimator_stays_recording_json_hdf5() -> None:
         ({**LINES, "estimator": "Hv"}, "must be absent where there is no time series"),
     ],
 )
-def test_no_estimator_nothing_estimate_refused(entry: dict[str, Any], says: str) -> None:
-    """What is no estimator or has nothing to estimate is refused."""
+def test_what_is_no_estimator_or_has_nothing_to_estimate_is_refused(entry: dict[str, Any], says: str) -> None:
     _, (problem,) = from_dict(document(entry))
     assert (problem.field, problem.allowed) == ("estimator", says)
 
@@ -180,8 +177,7 @@ def of_rig(**changes: Any) -> FrfRecording:
     return read
 
 
-def test_rig_description_says_estimator() -> None:
-    """The rig description says the estimator of its recordings."""
+def test_the_rig_description_says_the_estimator_of_its_recordings() -> None:
     assert of_rig().estimator is None
     h1, h2, hv = (estimated(of_rig(estimator=name)) for name in ESTIMATORS)
     np.testing.assert_allclose(estimated(of_rig()), h1)
@@ -206,7 +202,6 @@ def test_rig_description_says_estimator() -> None:
         ),
     ],
 )
-def test_rig_description_refused_estimator(changes: dict[str, Any], field: str) -> None:
-    """A rig description is refused where its estimator cannot be used."""
+def test_a_rig_description_is_refused_where_its_estimator_cannot_be_used(changes: dict[str, Any], field: str) -> None:
     with pytest.raises(InvalidInput, match=f"^{field} = "):
         rig(**changes)

@@ -48,8 +48,7 @@ def curve(way: str, noise: float, *, exchanged: bool, unit: float = 1.0, seed: i
 
 @pytest.mark.parametrize("way", ["back", "held", "from contact", "in"])
 @pytest.mark.parametrize("noise", [0.003, 0.03])
-def test_exchanged_columns_curve_give_no_modulus(way: str, noise: float) -> None:
-    """Exchanged columns of a curve give no modulus."""
+def test_exchanged_columns_of_a_curve_give_no_modulus(way: str, noise: float) -> None:
     (found,) = elastomer.of_campaign(curve(way, noise, exchanged=True))
     assert isinstance(found.result, InvalidInput)
     assert "look exchanged" in str(found.result)
@@ -87,8 +86,7 @@ def test_moves_like_physics_not_exchanged() -> None:
 
 
 @pytest.mark.parametrize(("unit", "slip"), [(1e3, "N for mN"), (1e6, "N for µN"), (1e-3, "N for kN")])
-def test_slip_curve_s_force_told_reading(unit: float, slip: str) -> None:
-    """A slip of a curve s force is told at reading."""
+def test_a_slip_of_a_curves_force_is_told_at_reading(unit: float, slip: str) -> None:
     campaign = curve("back", 0.01, exchanged=False, unit=unit)
     (finding,) = plausibility.at_reading(campaign)
     assert finding.code == "units_off_by_1000"
@@ -125,10 +123,9 @@ def frfs(preloads: tuple[float, ...], radii: tuple[float, ...], modulus: float, 
     ("preloads", "radii", "modulus"),
     [((1.0, 2.0), (4.0, 10.0), 16.0), ((0.25, 0.5, 1.0), (4.0, 8.0), 2.0), ((0.5,), (5.0,), 1.0)],
 )
-def test_exchanged_preloads_spheres_give_no_d33(
+def test_exchanged_preloads_and_spheres_give_no_d33(
     table: SigmaTable, preloads: tuple[float, ...], radii: tuple[float, ...], modulus: float
 ) -> None:
-    """Exchanged preloads and spheres give no d33."""
     with pytest.raises(NoD33, match="or preload_n and indenter_radius_mm are exchanged"):
         invert(frfs(preloads, radii, modulus, exchanged=True), table)
     assert invert(frfs(preloads, radii, modulus, exchanged=False), table).campaign_d33 is not None
@@ -155,8 +152,7 @@ def test_small_sphere_pressed_hard_not_exchanged(table: SigmaTable) -> None:
     assert len(found.left_out) == 2
 
 
-def test_diagnosis_names_exchanged_preloads() -> None:
-    """A diagnosis names exchanged preloads and spheres."""
+def test_a_diagnosis_names_exchanged_preloads_and_spheres() -> None:
     report = diagnose(frfs((1.0, 2.0), (4.0, 10.0), 16.0, exchanged=True))
     assert report["verdict"] == "insufficient_data"
     assert "or preload_n and indenter_radius_mm are exchanged" in report["statement"]

@@ -45,8 +45,7 @@ def refusal(read: Campaign) -> str:
 
 
 @pytest.mark.parametrize("depth_mm", [0.1, 0.25])
-def test_declared_thickness_gives_layer_s_law(depth_mm: float) -> None:
-    """A declared thickness gives the layer s law."""
+def test_a_declared_thickness_gives_the_layers_law(depth_mm: float) -> None:
     depth = ways(-0.05, depth_mm, samples=400)
     force = pressed(depth, bonded_layer(2.0, 2.0))
     found = result(campaign(depth, force, skin={"thickness_mm": 2.0}))

@@ -146,8 +146,7 @@ def test_end_name_no_label_against_rig(heading: str) -> None:
 
 
 @pytest.mark.parametrize("heading", ["F_mN", "Force lbs", "Force mV", "Force / V", "Force (V)", "Force dB"])
-def test_end_name_unit_contradicts_rig(heading: str) -> None:
-    """The end of a name that is a unit contradicts the rig."""
+def test_the_end_of_a_name_that_is_a_unit_contradicts_the_rig(heading: str) -> None:
     with pytest.raises(FileError, match=r"is labelled '.*', but the rig description says 'N'"):
         read_file(tdms(heading, ""), "a.tdms", rig({"channel": heading, "unit": "N"}))
 

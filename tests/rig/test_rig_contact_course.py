@@ -142,16 +142,14 @@ def test_sticks_stiffens_far_contact_wide(law: str) -> None:
     assert force[growing] == pytest.approx(expected, abs=2e-3 * force.max())
 
 
-def test_contact_sticks_up_law_locks_refused() -> None:
-    """A contact that sticks up to where its law locks is refused."""
+def test_a_contact_that_sticks_up_to_where_its_law_locks_is_refused() -> None:
     coefficient = 0.88 / (0.2 * np.sqrt(DEPTH / R))
     stiff = sphere_law({"strain_stiffening": {"law": "limited", "coefficient": coefficient}}, R, 1.0, DEPTH)
     with pytest.raises(RigError, match="wider"):
         there_and_back(Body(stiff, E, approach=W, separation=W), 0.0)
 
 
-def test_without_adhesion_contact_hertzian() -> None:
-    """Without adhesion the contact is hertzian and with little nearly so."""
+def test_without_adhesion_the_contact_is_hertzian_and_with_little_nearly_so() -> None:
     _, _, depth, force = there_and_back(replace(STICKY, approach=0.0, separation=0.0), 0.0)
     hertz = 4 / 3 * PLANE * np.sqrt(R) * np.maximum(depth, 0) ** 1.5
     assert force == pytest.approx(hertz, abs=1e-5 * hertz.max())
@@ -193,8 +191,7 @@ def test_two_prony_pairs_follow_lee_radok_ting() -> None:
     assert np.interp(8.5, time, force) == 0  # the surface has not recovered yet
 
 
-def test_hold_under_soft_stage_sphere_creeps() -> None:
-    """In a hold under a soft stage the sphere creeps in."""
+def test_in_a_hold_under_a_soft_stage_the_sphere_creeps_in() -> None:
     body = Body(LAW, E, Relaxation(FRACTIONS, TIMES))
     time, travel, depth, force = there_and_back(body, 100.0)
     held = (time > 4.02) & (time < 4.98)

@@ -19,8 +19,7 @@ from rig.truth import truth_of_curves, truth_of_lines
 from underskin.recordings import campaign as campaigns
 
 
-def test_seed_number_give_campaign() -> None:
-    """The same seed and number give the same campaign."""
+def test_the_same_seed_and_number_give_the_same_campaign() -> None:
     assert drawn(1, 2) == drawn(1, 2)
     assert drawn(1, 2) != drawn(1, 3)
     assert campaign(record(drawn(1, 2))) == campaign(record(drawn(1, 2)))
@@ -46,8 +45,7 @@ def test_all_effects_of_the_kind_are_drawn() -> None:
 
 
 @pytest.mark.slow
-def test_draws_campaigns_within_tables_truth() -> None:
-    """Draws are campaigns within the tables and their truth says what shows."""
+def test_draws_are_campaigns_within_the_tables_and_their_truth_says_what_shows() -> None:
     shows = []
     for number in range(8):
         recorded = record(drawn(7, number))
@@ -78,8 +76,7 @@ def test_curves_are_drawn_too(kind: str, count: int) -> None:
 
 
 @pytest.mark.parametrize(("what", "count"), [("none", 0), ("single", 1), ("pair", 2), ("unknown", 1)])
-def test_raw_curves_hide_asked_scales(what: str, count: int) -> None:
-    """Raw curves hide what is asked on both scales."""
+def test_raw_curves_hide_what_is_asked_on_both_scales(what: str, count: int) -> None:
     radii = []
     for number in range(8):
         random = np.random.default_rng([9, number])

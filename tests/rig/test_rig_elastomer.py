@@ -127,8 +127,7 @@ def test_base_below_thin_layer_stiffens_exact() -> None:
     assert found == pytest.approx(1.0197 * 4 / 3 * E_MPA / 0.75 * a**3 / radius, rel=3e-4)
 
 
-def test_stage_gives_moves_further_force() -> None:
-    """Stage that gives moves further by force over stiffness."""
+def test_stage_that_gives_moves_further_by_force_over_stiffness() -> None:
     _, depth, force = curve("indentation", {"instrument_compliance": {"stiffness_n_per_mm": 5.0}})
     assert force == pytest.approx(hertz(depth - force / 5.0), rel=1e-4, abs=1e-5)
 
@@ -144,8 +143,7 @@ def test_every_effect_shows_and_is_seen_to_show(kind: str, name: str, values: di
     campaigns.parse(campaign_of_curves(planned, recorded))
 
 
-def test_without_effect_nothing_see() -> None:
-    """Without an effect there is nothing to see."""
+def test_without_an_effect_there_is_nothing_to_see() -> None:
     for kind in ("indentation", "compression"):
         planned = parse(described(kind, {}, force_noise_n=2e-3, contact_point_mm=0.01))
         assert -15 < visibility(planned, record_curves(planned)).chi2_gain < 1e-3  # two fitted parameters

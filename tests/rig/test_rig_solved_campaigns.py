@@ -72,8 +72,7 @@ def test_designs() -> None:
     assert sum(SHARES.values()) == pytest.approx(1)
 
 
-def test_creep() -> None:
-    """Creep softens from the modulus at once to its relaxed share."""
+def test_creep_softens_from_the_modulus_at_once_to_its_relaxed_share() -> None:
     relaxed = World(CREEP, {"fraction": 0.4, "time_s": 10.0}).relaxed(np.array([0.0, 10.0, 1e4]))
     assert relaxed[0] == 1
     assert relaxed[1] < 0.8

@@ -11,8 +11,7 @@ from rig.unlisted.layer import base_stress, hertz_radius, hertz_transform, punch
 from tests.support.oracle import oracle_rows
 
 
-def test_bonded_incompressible_layer_closed_form() -> None:
-    """Bonded incompressible layer is the closed form."""
+def test_bonded_incompressible_layer_is_the_closed_form() -> None:
     np.testing.assert_allclose(layer_transfer(0.5), transfer()[1], rtol=1e-12)
 
 

@@ -157,8 +157,7 @@ def test_crosstalk_adds_charge_near_sensors() -> None:
         ],
     ),
 )
-def test_static_mechanisms_bench_recognised(companion: Companion, name: str) -> None:
-    """Static mechanisms of the bench are recognised."""
+def test_static_mechanisms_of_the_bench_are_recognised(companion: Companion, name: str) -> None:
     design = _design(4, "load_cycles")
     data = measure(np.random.default_rng(2), design, None, companion)
     seen = amplitudes(design, data, np.ones_like(data.frf), None, base_state(design))
@@ -173,8 +172,7 @@ def test_static_mechanisms_bench_recognised(companion: Companion, name: str) -> 
     ("name", "parameters"),
     [("timing_delay", (500.0,)), ("amplifier_high_pass", (0.4,)), ("contact_resonance", (1.5, 0.08))],
 )
-def test_spectral_mechanisms_bench_recognised(name: str, parameters: tuple[float, ...]) -> None:
-    """Spectral mechanisms of the bench are recognised."""
+def test_spectral_mechanisms_of_the_bench_are_recognised(name: str, parameters: tuple[float, ...]) -> None:
     design = _design(4)
     data = measure(np.random.default_rng(2), design, None, Companion(name, parameters))
     lines = Lines(design, data, None, base_state(design))
@@ -231,18 +229,16 @@ def test_law_listed_mechanism_not_identifiable(law: Law, needs: str, names: set[
 
 
 @pytest.mark.slow
-def test_companion_catalogue_not_hide_law() -> None:
-    """A companion of the catalogue does not hide a law."""
+def test_a_companion_of_the_catalogue_does_not_hide_a_law() -> None:
     law = Law("gain", "temperature_c", "linear", (), (0.2,))
     entry = _entry(_design(4, "temperature_c"), law, Companion("preload_dependent_d33", (0.3,)))
     assert entry["chi2_gain_over_best_listed"] > 0.7 * entry["chi2_gain_over_base"] > 100.0
 
 
 @pytest.mark.slow
-def test_companion_replaced_mechanism_kept(
+def test_a_companion_is_replaced_by_its_own_mechanism_and_kept_beside_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A companion is replaced by its own mechanism and kept beside the others."""
     only_of(monkeypatch, "crosstalk", "misalignment", "preload_dependent_d33")
     design, companion = _design(4), Companion("preload_dependent_d33", (1.0,))
     data = measure(np.random.default_rng(2), design, None, companion)

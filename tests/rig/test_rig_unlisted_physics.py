@@ -68,8 +68,7 @@ def test_hertz_and_its_exponents() -> None:
     assert a[2] == pytest.approx(2.0 * a[0])
 
 
-def test_finite_strain_estimate_vanishes_load() -> None:
-    """Finite strain estimate vanishes with the load."""
+def test_finite_strain_estimate_vanishes_with_the_load() -> None:
     assert float(finite_strain_shift(np.array([1e-9]), np.array([10.0]), 16.0)[0]) < 1e-4
     assert float(finite_strain_shift(np.array([1.6]), np.array([10.0]), 16.0)[0]) == pytest.approx(0.01285, abs=1e-4)
 

@@ -10,8 +10,7 @@ from rig.wrong_modulus import drawn_wrong_modulus, wrong_modulus
 
 
 @pytest.mark.slow
-def test_declared_modulus_wrong_factor_two_four() -> None:
-    """The declared modulus is wrong by a factor of two to four."""
+def test_the_declared_modulus_is_wrong_by_a_factor_of_two_to_four() -> None:
     factors, kinds = [], set()
     for number in range(12):
         joint = wrong_modulus(3, number)
@@ -27,8 +26,7 @@ def test_declared_modulus_wrong_factor_two_four() -> None:
     assert kinds == {"frf", "compression", "indentation"}
 
 
-def test_lines_skin_true_modulus() -> None:
-    """The lines are those of a skin of the true modulus."""
+def test_the_lines_are_those_of_a_skin_of_the_true_modulus() -> None:
     joint = wrong_modulus(3, 1)
     document = joint.documents[0]
     described = dict(document.experiment.document)

@@ -107,8 +107,7 @@ def test_fresh_solves_off_the_nodes(table: ContactTable, contacts: Contacts, edg
 
 
 @pytest.mark.parametrize("radius", [0.5, 1.1, 3.0, 8.0])
-def test_stiffness_slope_force_over_indentation(contacts: Contacts, radius: float) -> None:
-    """Stiffness is the slope of force over indentation."""
+def test_stiffness_is_the_slope_of_force_over_indentation(contacts: Contacts, radius: float) -> None:
     force = 3 * 0.05 * radius**2
     low, high = (contacts.at(force * f, radius).indentation for f in (0.99, 1.01))
     assert contacts.at(force, radius).stiffness == pytest.approx(0.02 * force / (high - low), rel=1e-3)
@@ -149,8 +148,7 @@ def test_the_correction_keeps_the_force(table: ContactTable) -> None:
     assert np.abs(moment).max() < 1e-3
 
 
-def test_reported_errors_balance_forces(table: ContactTable) -> None:
-    """Reported errors and the balance of forces."""
+def test_reported_errors_and_the_balance_of_forces(table: ContactTable) -> None:
     assert table.attributes["force_balance_error"] < 1e-5
     assert 0 < table.correction_error.max() < 5e-3
     assert table.domain["a_over_h"] == (0.0, 3.0)

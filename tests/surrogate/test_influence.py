@@ -66,8 +66,7 @@ def test_point_forces_equal_the_oracle(quantity: str) -> None:
 
 
 @NEEDS_ORACLE
-def test_hertz_pressure_beside_sensor_equals() -> None:
-    """The hertz pressure beside the sensor equals the oracle."""
+def test_the_hertz_pressure_beside_the_sensor_equals_the_oracle() -> None:
     found, exact = [], []
     for row in oracle_rows("sigma_hertz")[:: 1 if SOAK else 4]:
         poisson_ratio, slip, rho, offset, value = numbers(row)
@@ -82,8 +81,7 @@ def test_hertz_pressure_beside_sensor_equals() -> None:
 
 
 @pytest.mark.slow
-def test_every_skin_domain_meets_exact_layer() -> None:
-    """Every skin of the domain meets the exact layer within the reported error."""
+def test_every_skin_of_the_domain_meets_the_exact_layer_within_the_reported_error() -> None:
     r = np.linspace(0, 12, 121)
     for _ in range(40 if SOAK else 20):
         poisson_ratio, slip, rho = (GENERATOR.uniform(*limits) for limits in list(TABLE.domain.values())[:3])
@@ -110,8 +108,7 @@ def test_reported_errors_are_small() -> None:
 @pytest.mark.parametrize(
     ("poisson_ratio", "slip", "orders"), [(0.5, 0.0, (2, 3)), (0.5, 1.0, (2, 3)), (0.35, 0.2, (2, 3, 4))]
 )
-def test_elements_converge_exact_layer(poisson_ratio: float, slip: float, orders: Sequence[int]) -> None:
-    """The elements converge to the exact layer."""
+def test_the_elements_converge_to_the_exact_layer(poisson_ratio: float, slip: float, orders: Sequence[int]) -> None:
     rho, r = np.array([0.1, 0.6, 2.0]), np.linspace(0, 6, 13)
     exact = elastic_layer.gamma_n(Layer(poisson_ratio, slip), r, rho[:, None])
     errors = [np.abs(solve_influence(poisson_ratio, slip, rho, r, order).normal - exact).max() for order in orders]
@@ -146,8 +143,7 @@ def test_superposition_mirror_and_rotation() -> None:
     assert mirrored == pytest.approx(whole, rel=1e-12)
 
 
-def test_force_points_away_sensor_pulls() -> None:
-    """A force that points away from the sensor pulls at it."""
+def test_a_force_that_points_away_from_the_sensor_pulls_at_it() -> None:
     influence = TABLE.at(0.6)
     assert influence is not None
     sensors, place = np.zeros((1, 2)), np.array([[0.8, 0.0]])
@@ -158,8 +154,7 @@ def test_force_points_away_sensor_pulls() -> None:
 
 
 @pytest.mark.parametrize("cells", [21, 201])
-def test_map_hertz_pressure_gives_contact(cells: int) -> None:
-    """A map of the hertz pressure gives the contact."""
+def test_a_map_of_the_hertz_pressure_gives_the_contact(cells: int) -> None:
     influence = TABLE.at(0.6)
     assert influence is not None
     a, sensors = 1.0, np.array([[0.0, 0.0], [0.7, 0.4], [3.0, -1.0]])
@@ -187,8 +182,7 @@ def test_uniform_pressure_over_wide_cells() -> None:
     assert first == pytest.approx(second, rel=3e-5)
 
 
-def test_beyond_reach_nothing_extrapolated() -> None:
-    """Beyond the reach nothing is extrapolated."""
+def test_beyond_the_reach_nothing_is_extrapolated() -> None:
     influence = TABLE.at(0.6)
     assert influence is not None
     assert np.isnan(influence.gamma_n([12.01, -0.1])).all()

@@ -36,8 +36,7 @@ def test_sigma_equals_the_oracle() -> None:
 
 
 @NEEDS_ORACLE
-def test_influence_point_force_equals_oracle() -> None:
-    """Influence of a point force equals the oracle."""
+def test_influence_of_a_point_force_equals_the_oracle() -> None:
     rho, _, offset, value = linear_layer_values("gamma_n")
     assert len(value) > 10
     assert linear_layer.gamma_n(offset, rho) == pytest.approx(value, abs=3e-8)

@@ -61,8 +61,7 @@ def test_finite_strain_reference_values() -> None:
 
 
 @pytest.mark.slow
-def test_volume_kept_path_loading_not_matter() -> None:
-    """Volume is kept and the path of loading does not matter."""
+def test_volume_is_kept_and_the_path_of_loading_does_not_matter() -> None:
     layer = NonlinearLayer(discretise(layer_mesh(0.5), 4))
     load = hertz_load(layer.discretisation, 0.5)
     peak = float(peak_pressures(np.cbrt(np.array([0.1])))[0])
@@ -74,8 +73,7 @@ def test_volume_kept_path_loading_not_matter() -> None:
 
 
 @pytest.mark.slow
-def test_surface_sinks_under_contact_base() -> None:
-    """The surface sinks under the contact and the base does not move."""
+def test_the_surface_sinks_under_the_contact_and_the_base_does_not_move() -> None:
     d = discretise(layer_mesh(0.5), 4)
     layer = NonlinearLayer(d)
     state = layer.equilibrium(layer.rest(), 0.3 * hertz_load(d, 0.5))
