@@ -151,11 +151,8 @@ def test_what_is_not_the_files_fault_is_tried_again(server: Server, tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_kills_random_moments_lose_double(server: Server, tmp_path: Path) -> None:
-    """Kills at random moments lose and double nothing.
-
-    Two files are saved for each watch that is killed: in the end there is each of them, once.
-    """
+def test_kills_at_random_moments_lose_and_double_nothing(server: Server, tmp_path: Path) -> None:
+    """Two files are saved for each watch that is killed: in the end there is each of them, once."""
     kills = 30 if os.environ.get("UNDERSKIN_SOAK") else 3
     moments = np.random.default_rng(900_013).uniform(SETTLE_S, SETTLE_S + 1.5, kills)
     with bench(tmp_path, address(server), "random") as at:

@@ -101,11 +101,8 @@ def test_value_bound_search_explains_nothing(table: SigmaTable, monkeypatch: pyt
     assert report.verdict == "unexplained" or "at or beyond 60 Hz" in report.statement
 
 
-def test_unlisted_law_over_frequency_leaves(table: SigmaTable) -> None:
-    """An unlisted law over frequency leaves no d33 to quote.
-
-    A low-pass that no catalogue lists takes from the response within the band that d33 is read from.
-    """
+def test_an_unlisted_law_over_frequency_leaves_no_d33_to_quote(table: SigmaTable) -> None:
+    """A low-pass that no catalogue lists takes from the response within the band that d33 is read from."""
     left_out = [*OF_LINES, "amplifier_low_pass", "sensor_relaxation", "contact_resonance"]
     report = underskin.diagnose(shaken(charge=low_pass(100.0)), table, without=left_out)
     assert report.verdict == "unexplained", report.statement

@@ -50,11 +50,8 @@ def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_p
 
 
 @pytest.mark.slow
-def test_single_file_diagnosed_blas_thread(tmp_path: Path) -> None:
-    """A single file is diagnosed with one blas thread.
-
-    As it is in a process of many: so that its report is the same on any machine.
-    """
+def test_a_single_file_is_diagnosed_with_one_blas_thread(tmp_path: Path) -> None:
+    """As it is in a process of many: so that its report is the same on any machine."""
     file = tmp_path / "palm.json"
     file.write_text(json.dumps(to_dict(campaign(ALONE, load_table()))), encoding="utf-8")
     code = (

@@ -362,11 +362,8 @@ def test_a_pull_off_without_a_jump_is_an_event() -> None:
     assert float(comes_off[2]) == pytest.approx(-0.1 * press.max(), rel=0.1)
 
 
-def test_not_tried_said_missing() -> None:
-    """What was not tried is said right after the verdict where it may be missing.
-
-    A hold of what relaxes, without times: creep is not tried, and the statement says why.
-    """
+def test_what_was_not_tried_is_said_right_after_the_verdict_where_it_may_be_missing() -> None:
+    """A hold of what relaxes, without times: creep is not tried, and the statement says why."""
     depth = np.concatenate([ways(-0.1, 0.3, samples=80), np.full(160, 0.3), ways(0.3, -0.1, samples=80)])
     force = force_of_elements(Body(2e-3, 1e6 / 0.75, 0.8, 0.8), depth * 1e-3, 0.02 * np.arange(float(len(depth))))
     report = diagnosed(campaign(depth, force, timed=False), "contact_creep")

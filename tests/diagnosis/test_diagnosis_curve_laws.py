@@ -137,11 +137,8 @@ def test_slow_noise_that_the_air_shows_is_no_law(seed: int, table: SigmaTable) -
     assert report["fit"]["after"]["youngs_modulus"]["value"] == pytest.approx(MODULUS_MPA, rel=0.02)
 
 
-def test_named_law_stands_before_unnamed(table: SigmaTable) -> None:
-    """A named law that does the same stands before the unnamed one.
-
-    A stage that gives moves the surface by its deflection, which no law over the time can be told from beside it.
-    """
+def test_a_named_law_that_does_the_same_stands_before_the_unnamed_one(table: SigmaTable) -> None:
+    """A stage that gives moves the surface by its deflection, which no law over the time can be told from beside it."""
     stiffness = LARGEST / (0.05 * DEPTH_MM)
     travel = np.linspace(0.0, DEPTH_MM, 2000)
     commanded = travel + force_on(travel) / stiffness

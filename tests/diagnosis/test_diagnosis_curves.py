@@ -136,11 +136,8 @@ def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])
-def test_known_stiffness_stage_decides_contact(stiffness: float | None) -> None:
-    """The known stiffness of a stage decides where contact ends.
-
-    Against JKR's equilibrium, from its two equations alone.
-    """
+def test_the_known_stiffness_of_a_stage_decides_where_contact_ends(stiffness: float | None) -> None:
+    """Against JKR's equilibrium, from its two equations alone."""
     radius, modulus, work = 7.5e-6, 1e6, 0.040
     reduced, a = modulus / 0.75, np.geomspace(1e-8, 6e-6, 100_001)
     depth = a**2 / radius - np.sqrt(2 * np.pi * work * a / reduced)
@@ -213,11 +210,8 @@ def cylinders(heights_mm: list[float], table: SigmaTable, *known: str, **effects
 
 
 @pytest.mark.slow
-def test_friction_platens_told_modulus_two(table: SigmaTable) -> None:
-    """Friction at the platens is told from the modulus by two shapes alone.
-
-    Of cylinders of one shape the interval of the modulus holds both.
-    """
+def test_friction_at_the_platens_is_told_from_the_modulus_by_two_shapes_alone(table: SigmaTable) -> None:
+    """Of cylinders of one shape the interval of the modulus holds both."""
     for effects in ({}, {"platen_friction": {"friction": 0.9}}):
         modulus = cylinders([2.5], table, "platen_friction", **effects)["fit"]["before"]["youngs_modulus"]
         assert modulus["low"] < 12.0 < modulus["high"]
@@ -284,11 +278,8 @@ def test_a_seating_platen_is_no_stiffening_and_stiffening_no_seat(seed: int, tab
 
 
 @pytest.mark.soak
-def test_two_mechanisms_share_bend_found(table: SigmaTable) -> None:
-    """Two mechanisms that share a bend are both found.
-
-    An elastomer whose modulus grows with the strain, pressed by a stage that gives: each bends the curves alike.
-    """
+def test_two_mechanisms_that_share_a_bend_are_both_found(table: SigmaTable) -> None:
+    """An elastomer whose modulus grows with the strain, pressed by a stage that gives: each bends the curves alike."""
     whole = parse(campaign_of_curves(*drawn_curves(777001, 109, INDENTATION, "pair")))
     report = lean_report(whole, table, *STAGE)
     found = {entry["name"]: entry["parameters"] for entry in report["mechanisms"]}

@@ -101,13 +101,10 @@ ONE = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("change", "which", "finding", "scale"), first(9, ONE))
-def test_wrong_named_not_count(
+def test_what_is_wrong_is_named_and_does_not_count(
     change: Change, which: Which, finding: tuple[str, str, str], scale: float, good: Campaign, table: SigmaTable
 ) -> None:
-    """What is wrong is named and does not count.
-
-    The rest agrees with the model, at the d33 that it has without; of lines a thousandth, at a thousandth of it.
-    """
+    """The rest agrees with the model, at the d33 that it has without; of lines a thousandth, at a thousandth of it."""
     report = looked_at(changed(good, change, which), table)
     assert finding in codes(report)
     assert {code for code, _, _ in codes(report)} - {"implausible_d33"} == {finding[0]}
@@ -245,11 +242,8 @@ def test_of_three_recordings_the_one_that_is_off_is_named_and_of_two_neither(fac
 
 
 @pytest.mark.slow
-def test_period_not_fit_recordings_named(good: Campaign, table: SigmaTable) -> None:
-    """A period that does not fit between recordings is named.
-
-    From 0.03 to 3.9 Hz is no impossible sweep, but not one in 20 s.
-    """
+def test_a_period_that_does_not_fit_between_recordings_is_named(good: Campaign, table: SigmaTable) -> None:
+    """From 0.03 to 3.9 Hz is no impossible sweep, but not one in 20 s."""
 
     def dated(entry: FrfRecording) -> FrfRecording:
         number = int(entry.id[1:])
@@ -264,11 +258,8 @@ def test_period_not_fit_recordings_named(good: Campaign, table: SigmaTable) -> N
 
 
 @pytest.mark.slow
-def test_reversed_recording_told_beside(table: SigmaTable) -> None:
-    """A reversed recording is told beside a resonance.
-
-    Few lines over a resonance differ as much as noise would, and their mean cancels: they are no silence.
-    """
+def test_a_reversed_recording_is_told_beside_a_resonance(table: SigmaTable) -> None:
+    """Few lines over a resonance differ as much as noise would, and their mean cancels: they are no silence."""
     made = Made(("contact_resonance",), (6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0)
     for parameters in ((30.0, 0.05), (6.0, 0.02)):
         resonant = campaign(replace(made, parameters=parameters), table)
@@ -278,12 +269,9 @@ def test_reversed_recording_told_beside(table: SigmaTable) -> None:
 
 
 @pytest.mark.slow
-def test_little_expected_silence_kept(table: SigmaTable) -> None:
-    """Where little is expected silence is kept.
-
-    Far beside the sensor the response is below the noise, as the model says: no sensor is dead, and such recordings are
-    counted as those of far contacts.
-    """
+def test_where_little_is_expected_silence_is_kept(table: SigmaTable) -> None:
+    """Far beside the sensor the response is below the noise, as the model says: no sensor is dead, and such recordings
+    are counted as those of far contacts."""
     far = campaign(Made(offsets_mm=(0.0, 5.5), lines=20, line=0.01), table)
     random = np.random.default_rng(2)
 
@@ -307,11 +295,8 @@ def test_forces_within_a_percent_are_one_force(spread: float, differs: bool, goo
 
 
 @pytest.mark.slow
-def test_bands_stamps_meant_no_slips(table: SigmaTable) -> None:
-    """Bands and stamps that may be meant are no slips.
-
-    Three bands of one sensor; and three sensors recorded at once, saved one after the other.
-    """
+def test_bands_and_stamps_that_may_be_meant_are_no_slips(table: SigmaTable) -> None:
+    """Three bands of one sensor; and three sensors recorded at once, saved one after the other."""
     three = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40), table)
     bands = ((0.1, 1.0), (1.0, 29.0), (30.0, 1000.0))
     banded = [

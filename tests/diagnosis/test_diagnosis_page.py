@@ -277,11 +277,8 @@ def in_lab_units(recording: str, shows: str) -> tuple[Floats, Floats]:
     return np.asarray(trace.x) * trace.meta["mm"], np.asarray(trace.y) * trace.meta["n"]
 
 
-def test_curves_explained_adhesion_alone_page() -> None:
-    """Curves are explained by adhesion alone and their page says the modulus.
-
-    A jump into contact between two samples asks for no companion.
-    """
+def test_curves_are_explained_by_adhesion_alone_and_their_page_says_the_modulus() -> None:
+    """A jump into contact between two samples asks for no companion."""
     report, text = adhesive_page()
     assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == ("explained", ["adhesion"])
     modulus = report["fit"]["after"]["youngs_modulus"]

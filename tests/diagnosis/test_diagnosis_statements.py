@@ -38,11 +38,8 @@ def with_slips(table: SigmaTable) -> Iterator[dict[str, Any]]:
             yield lean_report(wrong.campaign, table, *beside(*description["effects"], "sensor_spread"))
 
 
-def test_slip_decides_comes_before_verdict(table: SigmaTable) -> None:
-    """A slip that decides comes before the verdict.
-
-    In few sentences all the same, as `lean_report` holds every report to.
-    """
+def test_a_slip_that_decides_comes_before_the_verdict(table: SigmaTable) -> None:
+    """In few sentences all the same, as `lean_report` holds every report to."""
     begun = [report for report in with_slips(table) if report["verdict"] != "insufficient_data"]
     decided = [report for report in begun if "apart from that, " in sentences(report["statement"])[0]]
     assert len(decided) >= 2

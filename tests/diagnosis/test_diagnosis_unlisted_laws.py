@@ -118,11 +118,8 @@ def test_plan_compare_ends_law_changes_charge(warming: Campaign, warming_report:
     assert 22 <= int(told[1]) <= 32
 
 
-def test_cause_told_order_alone_followed(quiet: Campaign, table: SigmaTable) -> None:
-    """A cause is told where the order alone can be followed.
-
-    Where load cycles and times follow the order as well, each has another cause, and none holds four fifths.
-    """
+def test_a_cause_is_told_where_the_order_alone_can_be_followed(quiet: Campaign, table: SigmaTable) -> None:
+    """Where load cycles and times follow the order as well, each has another cause, and none holds four fifths."""
     step = changed(quiet, lambda _, number, __: 1.6 if number >= 30 else 1.0)
     entries = [replace(entry, load_cycles=None, recorded_at=None) for entry in frf_recordings(step)]
     found = reported(replace(step, recordings=tuple(entries)), table)
@@ -255,11 +252,8 @@ def test_contact_grows_power_force_hertz_s(
     assert "in place of 1/3" in report["statement"]
 
 
-def test_constant_phase_beside_weak_sensors_told(table: SigmaTable) -> None:
-    """A constant phase beside weak sensors is told apart from them.
-
-    Two sensors of six that lost a fifth and two fifths, and all FRFs turned by the same angle.
-    """
+def test_a_constant_phase_beside_weak_sensors_is_told_apart_from_them(table: SigmaTable) -> None:
+    """Two sensors of six that lost a fifth and two fifths, and all FRFs turned by the same angle."""
     made = campaign(Made(sensors=6, gain=0.01, line=0.005, highest_hz=800.0), table)
     kept = {"s2": 0.8, "s4": 0.6}
     phase = np.exp(-1j * np.radians(1.2))
@@ -284,13 +278,10 @@ RIG: list[tuple[dict[str, Any], tuple[str, str, str], dict[str, float]]] = [
 
 
 @pytest.mark.parametrize(("effects", "law", "values"), first(1, RIG))
-def test_rig_hides_order_recordings_found(
+def test_what_the_rig_hides_in_the_order_of_recordings_is_found(
     effects: dict[str, Any], law: tuple[str, str, str], values: dict[str, float], table: SigmaTable
 ) -> None:
-    """What the rig hides in the order of recordings is found.
-
-    A place that runs round is a periodic place; what remembers the preload before follows that.
-    """
+    """A place that runs round is a periodic place; what remembers the preload before follows that."""
     report = rig_report(table, effects, *FEW)
     assert all(wanted in ("", found) for found, wanted in zip(law_of(report), law, strict=True))
     told = {entry["name"]: entry["value"] for entry in report["unnamed"]["parameters"]}

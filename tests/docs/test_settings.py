@@ -29,11 +29,8 @@ def test_every_setting_is_documented_with_its_default() -> None:
     assert not documented
 
 
-def test_every_variable_read_documented() -> None:
-    """Every variable that is read is documented.
-
-    Read: quoted in Python, or expanded in shell.
-    """
+def test_every_variable_that_is_read_is_documented() -> None:
+    """Read: quoted in Python, or expanded in shell."""
     folders = ("underskin", "service", "tablegen", "examples", "bench", "docs", "scripts", "tests")
     sources = [source for folder in folders for source in (ROOT / folder).rglob("*.*")]
     used: set[str] = set()

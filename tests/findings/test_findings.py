@@ -67,11 +67,8 @@ def test_each_reason_is_used() -> None:
     assert [reason.name for reason in Reason if f"Reason.{reason.name}" not in text] == []
 
 
-def test_arguments_findings_words_need() -> None:
-    """Arguments of findings are those that their words need.
-
-    Where a finding is made with its arguments written out.
-    """
+def test_arguments_of_findings_are_those_that_their_words_need() -> None:
+    """Where a finding is made with its arguments written out."""
     checked = 0
     for path, call in findings_made():
         reason, arguments = call.args[0], call.args[3] if len(call.args) > 3 else None

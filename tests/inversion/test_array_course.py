@@ -42,11 +42,8 @@ def test_a_steady_fall_is_told_with_its_interval() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("gain", [0.0, 0.01])
-def test_intervals_cover_change_gain_date(gain: float) -> None:
-    """Intervals cover the change with the gain that a date has.
-
-    The scatter common to a date is no change of d33: five dates tell it, and the interval holds it.
-    """
+def test_intervals_cover_the_change_with_the_gain_that_a_date_has(gain: float) -> None:
+    """The scatter common to a date is no change of d33: five dates tell it, and the interval holds it."""
     generator, covered, apart = np.random.default_rng(2), 0, 0
     course, unchanged, number = np.log(np.linspace(1.0, 0.92, 5)), np.zeros(5), 150
     times = np.arange(5.0)
@@ -90,11 +87,8 @@ def test_two_dates_tell_a_change_that_the_chain_may_have_made() -> None:
     assert "another gain of the chain" in found.statement
 
 
-def test_dates_share_no_sensor_not_compared() -> None:
-    """Dates that share no sensor are not compared.
-
-    Sensors one to four on the first two dates, the others on two later ones, with another gain.
-    """
+def test_dates_that_share_no_sensor_are_not_compared() -> None:
+    """Sensors one to four on the first two dates, the others on two later ones, with another gain."""
     d33 = recorded(np.random.default_rng(6), np.log([1.0, 1.0, 0.5, 0.5]))
     d33[:4, 2:] = d33[4:, :2] = np.nan
     found = told(d33)

@@ -30,11 +30,8 @@ def table() -> SigmaTable:
 
 
 @pytest.mark.slow
-def test_intervals_cover_often_say_usual_scatter(table: SigmaTable) -> None:
-    """Intervals cover as often as they say and usual scatter is never set aside.
-
-    And of whole sensors seldom one is accused, at most in a campaign of twenty.
-    """
+def test_intervals_cover_as_often_as_they_say_and_usual_scatter_is_never_set_aside(table: SigmaTable) -> None:
+    """And of whole sensors seldom one is accused, at most in a campaign of twenty."""
     random = np.random.default_rng(1)
     arrays, sensors, cells, accused = [], [], [], 0
     for _ in range(CAMPAIGNS):

@@ -349,11 +349,8 @@ def test_force_at_the_mains_alone_is_said(table: SigmaTable, mains_hz: float) ->
             assert found.campaign_d33.d33_rows()[0][0] == pytest.approx(14.0, rel=0.02)
 
 
-def test_zeros_outside_analyzers_band(table: SigmaTable) -> None:
-    """Zeros outside an analyzers band are no response.
-
-    They are no lines: no filter is seen in them and no mains pick-up, and d33 is that of the others.
-    """
+def test_zeros_outside_an_analyzers_band_are_no_response(table: SigmaTable) -> None:
+    """They are no lines: no filter is seen in them and no mains pick-up, and d33 is that of the others."""
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(22))
     lines = np.arange(1, 401.0)
     noise = 1 + 0.01 * np.random.default_rng(23).standard_normal((len(campaign.recordings), 400))

@@ -77,11 +77,8 @@ def test_times_are_needed_where_the_law_reads_them(campaign: Campaign) -> None:
     assert creeping.kinds == ("indentation",)
 
 
-def test_bound_law_counts_time_recording_began(campaign: Campaign) -> None:
-    """A bound law counts time from where the recording began.
-
-    Also where its first half is held out.
-    """
+def test_a_bound_law_counts_time_from_where_the_recording_began(campaign: Campaign) -> None:
+    """Also where its first half is held out."""
     own = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
     timed = [replace(entry, time_s=7.0 + np.arange(float(len(entry.force_n)))) for entry in own]
     whole = replace(campaign, recordings=tuple(timed))

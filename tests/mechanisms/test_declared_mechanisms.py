@@ -246,11 +246,8 @@ def test_the_commands_check_and_save(tmp_path: Path) -> None:
     assert parse(saved, "drawn_film.yaml").name == "drawn_film"
 
 
-def test_file_takes_long_parse_refused_process() -> None:
-    """A file that takes long to parse is refused in another process.
-
-    Brackets within brackets take the pure Python loader a time that grows with the square of their number.
-    """
+def test_a_file_that_takes_long_to_parse_is_refused_in_another_process() -> None:
+    """Brackets within brackets take the pure Python loader a time that grows with the square of their number."""
     began = time.process_time()
     assert "nested more than" in refusal("[" * 99_000).reason
     assert time.process_time() - began < 2
@@ -264,11 +261,8 @@ def test_json_is_read_with_all_its_characters() -> None:
     assert parse(text.encode(), "lab.json").plain == document["description"]
 
 
-def test_file_folder_cannot_used_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file of the folder that cannot be used is named.
-
-    The catalogue lists the others; no diagnosis is made without it.
-    """
+def test_a_file_of_the_folder_that_cannot_be_used_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The catalogue lists the others; no diagnosis is made without it."""
     (tmp_path / "a.yaml").write_text(WARM.replace("high: 0.1, prior: {mean: 0.01, sd: 0.01}", "high: 1.0e-300"))
     (tmp_path / "b.yaml").write_text(WARM)
     (tmp_path / "c.yaml").write_text(WARM)

@@ -65,11 +65,8 @@ def parameters() -> dict[str, Parameter]:
     return found
 
 
-def test_catalogue_order_composition() -> None:
-    """The catalogue is in order of composition.
-
-    A model composes by stage; the page that lists the names is held to the catalogue by its own test.
-    """
+def test_the_catalogue_is_in_order_of_composition() -> None:
+    """A model composes by stage; the page that lists the names is held to the catalogue by its own test."""
     stages = [mechanism.rank for mechanism in built_in()]
     assert stages == sorted(stages)
     assert [name for name in CATALOGUE if name in NAMES] == list(NAMES)

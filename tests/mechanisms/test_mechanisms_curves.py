@@ -137,11 +137,8 @@ def test_a_held_indentation_relaxes_to_what_is_left() -> None:
     assert found[-8:] == pytest.approx(elastic * (1 - 0.4 * (1 - np.exp(-time[-8:] / 10.0))), rel=1e-4)
 
 
-def test_relaxes_stiffens_stiffer_contact_moment() -> None:
-    """What relaxes and stiffens is stiffer by the contact of the moment.
-
-    On the way in and in a hold; on the way back the contact is that of Ting's law, smaller than in equilibrium.
-    """
+def test_what_relaxes_and_stiffens_is_stiffer_by_the_contact_of_the_moment() -> None:
+    """On the way in and in a hold; on the way back the contact is that of Ting's law, smaller than in equilibrium."""
     depth = np.concatenate([np.linspace(0.01, 0.5, 50), np.full(20, 0.5), np.linspace(0.49, 0.2, 30)])
     time = np.arange(100.0)
     creep = {"relaxed_fraction": 0.4, "relaxation_time": 10.0}

@@ -46,11 +46,8 @@ def test_a_moving_edge_has_the_published_ratios() -> None:
         assert (moving / level([], recording)).real == pytest.approx(ratio, abs=6e-4)
 
 
-def test_contact_wider_table_continued_wide() -> None:
-    """A contact wider than the table is continued as wide contacts transmit.
-
-    The pressure under a contact that is wide beside the thickness falls as 1/a².
-    """
+def test_a_contact_wider_than_the_table_is_continued_as_wide_contacts_transmit() -> None:
+    """The pressure under a contact that is wide beside the thickness falls as 1/a²."""
     for a, allowed in ((3.0, 1e-4), (3.2, 2e-3), (3.6, 1e-2), (4.2, 3e-2)):
         exact = normal_stress(transmission, hertz_transform, a, RHO)
         assert level([], linear_contact(a)).real == pytest.approx(float(exact), rel=allowed)
@@ -136,11 +133,8 @@ def strain_in_contact(a_over_h: float, load_parameter: float) -> float:
     return float(RectBivariateSpline(*solved.contact_axes, mean)(*at)[0, 0])
 
 
-def test_sphere_takes_back_dead_pressure_adds() -> None:
-    """A sphere takes back most of what a dead pressure adds.
-
-    PHYSICS.md, section 6: at L 0.09, R/h 1 a sphere's finite strain adds 2.3 % to σ, a dead pressure's 7.9 %.
-    """
+def test_a_sphere_takes_back_most_of_what_a_dead_pressure_adds() -> None:
+    """PHYSICS.md, section 6: at L 0.09, R/h 1 a sphere's finite strain adds 2.3 % to σ, a dead pressure's 7.9 %."""
     skin = replace(SKIN, thickness_mm=4.0, sensor_radius_mm=RHO * 4.0)
     force = 0.09 * 4.0**2 * E * 1e-6
     strained = frf_recording(preload_n=force, indenter_radius_mm=4.0)
@@ -151,11 +145,8 @@ def test_sphere_takes_back_dead_pressure_adds() -> None:
 
 
 @pytest.mark.parametrize("fraction", [0.2, 0.7])
-def test_held_contact_creeps_solid_modulus(fraction: float) -> None:
-    """A held contact creeps as a solid whose modulus relaxes so.
-
-    a³ by the hereditary integral of a constant force, ∫ E(t − s) d(a³)(s) = const, in steps of time.
-    """
+def test_a_held_contact_creeps_as_a_solid_whose_modulus_relaxes_so(fraction: float) -> None:
+    """a³ by the hereditary integral of a constant force, ∫ E(t − s) d(a³)(s) = const, in steps of time."""
     time = 30.0
     steps = np.linspace(0.0, 90.0, 3001)
     relaxed = 1 - fraction * (1 - np.exp(-steps / time))
@@ -193,11 +184,8 @@ def test_a_stiffening_contact_solves_its_own_strain() -> None:
 
 
 @pytest.mark.parametrize(("dynamic", "error"), [(0.05, 1e-6), (0.33, 2e-5), (0.39, 1e-4), (0.8, 1e-5), (1.5, 0.01)])
-def test_moving_edge_gives_first_harmonic_charge(dynamic: float, error: float) -> None:
-    """A moving edge gives the first harmonic of the charge.
-
-    Beyond the preload the sphere leaves the skin for a part of the cycle.
-    """
+def test_a_moving_edge_gives_the_first_harmonic_of_the_charge(dynamic: float, error: float) -> None:
+    """Beyond the preload the sphere leaves the skin for a part of the cycle."""
     preload, phase = 1.0, (np.arange(512) + 0.5) * 2 * np.pi / 512
     force = np.maximum(preload + dynamic * np.sin(phase), 1e-9)
     a, load = hertz.contact_radius(force, 4e-3, E), hertz.load_parameter(force, 4e-3, E)
@@ -208,11 +196,8 @@ def test_moving_edge_gives_first_harmonic_charge(dynamic: float, error: float) -
     assert moving.real == pytest.approx(first_harmonic, rel=error)
 
 
-def test_without_dynamic_force_moving_edge_gives() -> None:
-    """Without a dynamic force a moving edge gives the limit of a small one.
-
-    The derivative of the charge, and the flat punch's σ where finite strain adds nothing.
-    """
+def test_without_a_dynamic_force_a_moving_edge_gives_the_limit_of_a_small_one() -> None:
+    """The derivative of the charge, and the flat punch's σ where finite strain adds nothing."""
     recording = replace(frf_recording(), dynamic_force_n=0.0)
     step = 1e-4
     charges = [f * level([], frf_recording(preload_n=f)).real for f in (1.0 - step, 1.0 + step)]

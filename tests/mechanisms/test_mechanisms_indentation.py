@@ -284,11 +284,8 @@ def test_two_recordings_do_not_feel_each_other() -> None:
     assert found[len(LOOP) :] == pytest.approx(alone)
 
 
-def test_stage_expected_stiff_sphere_s_size_says() -> None:
-    """A stage is expected as stiff as the sphere s size says.
-
-    A stage of 150 N/mm and one of 150 N/m are as usual beside their spheres of 5 mm and 5 µm.
-    """
+def test_a_stage_is_expected_as_stiff_as_the_spheres_size_says() -> None:
+    """A stage of 150 N/mm and one of 150 N/m are as usual beside their spheres of 5 mm and 5 µm."""
     usual = []
     for radius in (5.0, 5e-3):
         curve = IndentationConditions("c", radius, np.linspace(0.0, 0.01, 5))

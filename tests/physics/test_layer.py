@@ -62,11 +62,8 @@ def test_the_incompressible_bonded_layer_has_its_closed_form() -> None:
     assert Layer().compliance(k).value == pytest.approx(closed, rel=1e-12)
 
 
-def test_frictionless_base_transmits_alike() -> None:
-    """A frictionless base transmits alike for every poisson ratio.
-
-    (sinh k + k cosh k)/(sinh k cosh k + k), as for the half of a plate of thickness 2h pressed from both sides.
-    """
+def test_a_frictionless_base_transmits_alike_for_every_poisson_ratio() -> None:
+    """(sinh k + k cosh k)/(sinh k cosh k + k), as for the half of a plate of thickness 2h pressed from both sides."""
     k = K[2:-1]
     closed = (np.sinh(k) + k * np.cosh(k)) / (np.sinh(k) * np.cosh(k) + k)
     for poisson_ratio in (0.0, 0.3, 0.5):

@@ -57,11 +57,8 @@ def test_the_transmission_is_that_of_surface_and_base_at_the_ends() -> None:
         assert base == pytest.approx(Layer(poisson_ratio).transmission(k).value, rel=1e-11)
 
 
-def test_closed_form_half_space_transform() -> None:
-    """The closed form of the half space is its transform.
-
-    Huber's closed form against the Hankel integral, whose unit of length is the depth.
-    """
+def test_the_closed_form_of_the_half_space_is_its_transform() -> None:
+    """Huber's closed form against the Hankel integral, whose unit of length is the depth."""
     for depth in (0.2, 1.0, 4.0):
         closed = half_space_stress(A, R, np.array([depth]))[:, 0]
         integral = half_space.sigma(A[:, None] / depth, 0.0, R / depth) / depth**2
@@ -74,11 +71,8 @@ def test_a_point_force_on_the_half_space_is_boussinesqs() -> None:
     assert half_space_stress(np.array([1e-4]), R, depth)[0] == pytest.approx(expected, rel=1e-6)
 
 
-def test_small_contact_near_surface_not_feel() -> None:
-    """A small contact near the surface does not feel the base.
-
-    a/h → 0 at depths of the order of a: half the Hertz pressure at d = a, as in the half space, 1/(1 + (d/a)²).
-    """
+def test_a_small_contact_near_the_surface_does_not_feel_the_base() -> None:
+    """a/h → 0 at depths of the order of a: half the Hertz pressure at d = a, as in the half space, 1/(1 + (d/a)²)."""
     a = np.array([0.002])
     depth = a[0] * np.array([0.5, 1.0, 2.0])
     on_axis = layer_stress(0.5, a, np.zeros(1), depth)[0, :, 0]
@@ -86,11 +80,8 @@ def test_small_contact_near_surface_not_feel() -> None:
 
 
 @pytest.mark.parametrize("poisson_ratio", RATIOS)
-def test_stress_equilibrium_compatible(poisson_ratio: float) -> None:
-    """The stress is in equilibrium and compatible.
-
-    Without body forces σ_zz is biharmonic: ∇²∇²σ_zz = 0, with ∇² = ∂²/∂r² + (1/r) ∂/∂r + ∂²/∂z², on the axis.
-    """
+def test_the_stress_is_in_equilibrium_and_compatible(poisson_ratio: float) -> None:
+    """Without body forces σ_zz is biharmonic: ∇²∇²σ_zz = 0, with ∇² = ∂²/∂r² + (1/r) ∂/∂r + ∂²/∂z², on the axis."""
     step, middle = 0.04, 0.5
     offsets = np.linspace(-3 * step, 3 * step, 7)
 

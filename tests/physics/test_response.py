@@ -21,11 +21,8 @@ def test_uncertainties_add_in_quadrature_and_have_no_sign() -> None:
     assert uncertainty == pytest.approx(abs(value) * 0.05, rel=1e-12)
 
 
-def test_wide_sensor_collects_d33_times_force() -> None:
-    """A wide sensor collects d33 times the force.
-
-    σ → 2/(3ρ²) when the sensor catches all of the force.
-    """
+def test_a_wide_sensor_collects_d33_times_the_force() -> None:
+    """σ → 2/(3ρ²) when the sensor catches all of the force."""
     rho = 100.0
     assert charge_response.frf(14e-12, 2 / (3 * rho**2), rho) == pytest.approx(14e-12, rel=1e-15)
 

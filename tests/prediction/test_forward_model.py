@@ -112,11 +112,8 @@ def test_a_skin_without_sensors_has_one_at_the_origin() -> None:
     assert [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors] == [(0.0, 0.0)]
 
 
-def test_indentation_follows_hertz_displacement() -> None:
-    """An indentation follows hertz from displacement zero.
-
-    Without finite strain; half of it, where nothing is said, makes the force up to 1.3 % less.
-    """
+def test_an_indentation_follows_hertz_from_displacement_zero() -> None:
+    """Without finite strain; half of it, where nothing is said, makes the force up to 1.3 % less."""
     hertz = hertz_force(DEPTH_MM, 4.0, 2.0)
     linear = predict(curve(), table(), {"finite_strain": 0.0}).value
     np.testing.assert_allclose(linear, hertz, rtol=1e-6, atol=1e-9)

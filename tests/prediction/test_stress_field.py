@@ -56,11 +56,8 @@ def test_sigma_of_a_compressible_layer_is_the_linear_one() -> None:
     assert np.isnan(contact.rel_error).all()
 
 
-def test_every_plane_bears_force_finite_strain() -> None:
-    """Every plane bears the force with finite strain too.
-
-    But for what lies beyond the section: up to 4 % on the base, by the table's own profile as by the field.
-    """
+def test_every_plane_bears_the_force_with_finite_strain_too() -> None:
+    """But for what lies beyond the section: up to 4 % on the base, by the table's own profile as by the field."""
     field = _field(radii=2001, thickness_mm=0.5, sensor_radius_mm=0.3, preload_n=20.0)
     contact = field.contact
     assert float(contact.load_parameter[0]) > 0.07
@@ -134,11 +131,8 @@ class _Open(NonlinearLayer):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("a", "load"), first(2, [(0.1, 0.004), (0.5, 0.01), (0.2, 0.02), (1.0, 0.004)]))
-def test_finite_elements_inside_layer_differ(a: float, load: float) -> None:
-    """The finite elements inside the layer differ by no more than is said.
-
-    The bound holds everywhere, and is not four times too wide at small contacts, where it was measured.
-    """
+def test_the_finite_elements_inside_the_layer_differ_by_no_more_than_is_said(a: float, load: float) -> None:
+    """The bound holds everywhere, and is not four times too wide at small contacts, where it was measured."""
     layer = _Open(discretise(layer_mesh(a, 1), 4))
     peak = float(peak_pressures(np.cbrt(np.array([load])))[0])
     state = layer.rest()

@@ -86,11 +86,8 @@ def test_drawn_cases_tell_nothing_of_the_truth() -> None:
     assert document["skin"]["d33_pc_per_n"] is None
 
 
-def test_every_effect_drawn_supposed() -> None:
-    """Every effect that is drawn can be supposed where it is.
-
-    The ideal diagnoser's laws reach the parameters that the rig draws, and no others of the same name.
-    """
+def test_every_effect_that_is_drawn_can_be_supposed_where_it_is() -> None:
+    """The ideal diagnoser's laws reach the parameters that the rig draws, and no others of the same name."""
     for number in range(60 if SOAK else 40):
         description = drawn(3, number)
         effects = parse_experiment(description).effects
@@ -157,11 +154,8 @@ def test_a_diagnosis_that_fails_is_a_wrong_answer(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_paper_s_question_left_open_settle() -> None:
-    """The paper s question is left open and what would settle it is planned.
-
-    Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart.
-    """
+def test_the_papers_question_is_left_open_and_what_would_settle_it_is_planned() -> None:
+    """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
     made = paper_array.worlds()
     array = diagnose(parse(made["array"]), load_table())
     rivals = {"preload_dependent_d33", "ageing"}
@@ -177,11 +171,8 @@ def test_paper_s_question_left_open_settle() -> None:
 
 
 @pytest.mark.soak
-def test_settle_paper_s_question() -> None:
-    """What would settle the paper s question does.
-
-    Both preloads on late sensors: what did it is named.
-    """
+def test_what_would_settle_the_papers_question_does() -> None:
+    """Both preloads on late sensors: what did it is named."""
     made = paper_array.worlds()
     aged = diagnose(parse(made["array, then both preloads: age did it"]), load_table())
     assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}

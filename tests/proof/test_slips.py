@@ -56,11 +56,8 @@ def test_a_third_that_is_conjugated_shows_by_two_signs_and_one_course_does_not()
     assert over_one_sign(made, np.zeros_like(turned), 1 / 3) <= 0.0
 
 
-def test_exchange_cables_leaves_no_step_either() -> None:
-    """An exchange of cables leaves no more than a step of either sensor leaves.
-
-    Against least squares, with a level of each sensor and a step of one of the two.
-    """
+def test_an_exchange_of_cables_leaves_no_more_than_a_step_of_either_sensor_leaves() -> None:
+    """Against least squares, with a level of each sensor and a step of one of the two."""
     description = drawn(8, 3, "none")
     description["skin"]["array"] |= {"columns": 2, "rows": 2}
     description["design"].pop("offsets_mm", None)

@@ -7,11 +7,8 @@ from scipy.stats import binom
 from proof.statistics import calibration, chance_of_so_few, share
 
 
-def test_wilson_interval_against_known_values() -> None:
-    """Wilson interval against its known values.
-
-    Brown, Cai, DasGupta (2001): 0 of 10 gives 0 to 0.2775.
-    """
+def test_wilson_interval_against_its_known_values() -> None:
+    """Brown, Cai, DasGupta (2001): 0 of 10 gives 0 to 0.2775."""
     assert share([False] * 10).interval == pytest.approx((0.0, 0.2775), abs=1e-4)
     low, high = share([True] * 5 + [False] * 5).interval
     assert low + high == pytest.approx(1.0)

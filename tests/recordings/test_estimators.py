@@ -53,11 +53,8 @@ def test_noise_in_the_charge_makes_h2_too_large_and_h1_not() -> None:
     assert np.mean(factor(0, NOISE, "H2")) == pytest.approx(np.mean(1 + share), abs=0.005)
 
 
-def test_noise_equal_relative_power_hv_alone() -> None:
-    """With noise of equal relative power hv alone is right.
-
-    A system without dynamics: every line has the ratio of noise to signal that Hv assumes.
-    """
+def test_with_noise_of_equal_relative_power_hv_alone_is_right() -> None:
+    """A system without dynamics: every line has the ratio of noise to signal that Hv assumes."""
     random = np.random.default_rng(900_002)
     force = random.standard_normal(SAMPLES)
     noise = [NOISE * np.std(force) * random.standard_normal(SAMPLES) for _ in range(2)]
@@ -71,13 +68,10 @@ def test_noise_equal_relative_power_hv_alone() -> None:
 
 
 @pytest.mark.slow
-def test_hv_stepped_sine_takes_noise_ratio_tones() -> None:
-    """Hv of a stepped sine takes its noise ratio from all tones.
-
-    White noise in both channels with the ratio of the signals' powers over both tones. At 125 Hz the charge has a
+def test_hv_of_a_stepped_sine_takes_its_noise_ratio_from_all_tones() -> None:
+    """White noise in both channels with the ratio of the signals' powers over both tones. At 125 Hz the charge has a
     quarter of its magnitude at 10 Hz, so that a ratio of that tone's own powers would give the geometric mean of H1 and
-    H2, which is too large there.
-    """
+    H2, which is too large there."""
     force = dwelling([10.0, 125.0], cycles=300)
     charge, true = answer_to(force), np.abs(known_frf(np.array([10.0, 125.0])))
     random, noise, repeats = np.random.default_rng(910_001), 0.007, 40 if SOAK else 10
@@ -102,11 +96,8 @@ def test_hv_stepped_sine_takes_noise_ratio_tones() -> None:
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_stated_uncertainty_scatter_repeats(estimator: Estimator) -> None:
-    """The stated uncertainty is the scatter of repeats.
-
-    Of lines below 300 Hz, over records with noise in both channels; by a formula of first order in (1 − γ²)/n.
-    """
+def test_the_stated_uncertainty_is_the_scatter_of_repeats(estimator: Estimator) -> None:
+    """Of lines below 300 Hz, over records with noise in both channels; by a formula of first order in (1 − γ²)/n."""
     found, stated = [], []
     for seed in range(930_001, 930_013 if SOAK else 930_009):
         force, charge = (signal[: SAMPLES // 2] for signal in noisy(NOISE, NOISE, seed))

@@ -63,11 +63,8 @@ def test_a_diagnosis_names_exchanged_columns() -> None:
     assert "look exchanged" in report["statement"]
 
 
-def test_moves_like_physics_not_exchanged() -> None:
-    """What moves like that by physics is not exchanged.
-
-    A hold that relaxes before a way back; a force that is controlled; a drift before the press.
-    """
+def test_what_moves_like_that_by_physics_is_not_exchanged() -> None:
+    """A hold that relaxes before a way back; a force that is controlled; a drift before the press."""
     rng = np.random.default_rng(3)
     relaxing = np.concatenate([1 - 0.4 * (1 - np.exp(-np.arange(200) / 60)), np.linspace(0.6, 0.0, 100)])
     held = np.concatenate([np.full(200, 0.4), np.linspace(0.4, 0.1, 100)])
@@ -131,22 +128,16 @@ def test_exchanged_preloads_and_spheres_give_no_d33(
     assert invert(frfs(preloads, radii, modulus, exchanged=False), table).campaign_d33 is not None
 
 
-def test_preloads_spheres_meant_used(table: SigmaTable) -> None:
-    """Preloads and spheres that are meant are used.
-
-    Of four loads that are meant one lies within the tables: its d33 is given, and the others are named.
-    """
+def test_preloads_and_spheres_that_are_meant_are_used(table: SigmaTable) -> None:
+    """Of four loads that are meant one lies within the tables: its d33 is given, and the others are named."""
     meant = replace(frfs((1.0, 2.0), (4.0, 10.0), 16.0, exchanged=True), units_checked=True)
     found = invert(meant, table)
     assert found.campaign_d33 is not None
     assert len(found.left_out) == 3
 
 
-def test_small_sphere_pressed_hard_not_exchanged(table: SigmaTable) -> None:
-    """A small sphere pressed hard is not exchanged.
-
-    R = 1 mm under 1 to 3 N: as one preload does not exceed the radius, what lies beyond the tables is left out.
-    """
+def test_a_small_sphere_pressed_hard_is_not_exchanged(table: SigmaTable) -> None:
+    """R = 1 mm under 1 to 3 N: as one preload does not exceed the radius, what lies beyond the tables is left out."""
     found = invert(frfs((1.0, 2.0, 3.0), (1.0,), 16.0, exchanged=False), table)
     assert found.recordings.inside.tolist() == [True, False, False]
     assert len(found.left_out) == 2
@@ -159,11 +150,8 @@ def test_a_diagnosis_names_exchanged_preloads_and_spheres() -> None:
 
 
 @pytest.mark.parametrize("strain", [0.02, 0.3])
-def test_displacement_begins_late_not_exchanged(strain: float) -> None:
-    """A displacement that begins late is not exchanged.
-
-    An extensometer with play reads zero at first; a force at zero before contact is told none the less.
-    """
+def test_a_displacement_that_begins_late_is_not_exchanged(strain: float) -> None:
+    """An extensometer with play reads zero at first; a force at zero before contact is told none the less."""
     rng = np.random.default_rng(5)
     steady = np.linspace(-0.2, 1.0, 500)
     strains = strain * np.maximum(steady, 0.0)
@@ -178,11 +166,8 @@ def test_displacement_begins_late_not_exchanged(strain: float) -> None:
         assert are_exchanged(CompressionRecording("block", 10.0, 10.0, displacement, force_n=force)) == expected
 
 
-def test_block_pressed_height_gives_no_modulus() -> None:
-    """A block pressed by more than its height gives no modulus.
-
-    Force and displacement of a block of 10 mm are exchanged: the "displacement" is 18 mm.
-    """
+def test_a_block_pressed_by_more_than_its_height_gives_no_modulus() -> None:
+    """Force and displacement of a block of 10 mm are exchanged: the "displacement" is 18 mm."""
     travel = np.linspace(0, 1, 60)
     columns = {"displacement_mm": (18 * travel).tolist(), "force_n": travel.tolist()}
     block = {"id": "b", "kind": "compression", "sample_height_mm": 10, "sample_diameter_mm": 12, **columns}

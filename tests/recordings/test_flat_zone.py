@@ -88,11 +88,8 @@ def test_a_flat_campaign_is_flat_throughout() -> None:
 
 
 @pytest.mark.parametrize(("excited_hz", "told"), [((20.0, 1e4), "below"), ((0.0, 9.0), "above")])
-def test_not_excited_no_flat_zone_however_wide(excited_hz: tuple[float, float], told: str) -> None:
-    """What was not excited is no flat zone however wide.
-
-    Uncorrelated noise over noise is as flat as a response where it is averaged long, and lies elsewhere.
-    """
+def test_what_was_not_excited_is_no_flat_zone_however_wide(excited_hz: tuple[float, float], told: str) -> None:
+    """Uncorrelated noise over noise is as flat as a response where it is averaged long, and lies elsewhere."""
     frequency = np.geomspace(0.2, 300.0, 400)
     follows = (frequency >= excited_hz[0]) & (frequency <= excited_hz[1])
     frfs, conditions = recorded(frequency, "")
@@ -112,11 +109,8 @@ def test_not_excited_no_flat_zone_however_wide(excited_hz: tuple[float, float], 
     assert "whole recorded range" not in zone.reason
 
 
-def test_force_few_sines_leaves_out_lines() -> None:
-    """A force of a few sines leaves out the lines between them.
-
-    One line in twenty is excited; between them the charge is noise, which nothing makes follow the force.
-    """
+def test_a_force_of_a_few_sines_leaves_out_the_lines_between_them() -> None:
+    """One line in twenty is excited; between them the charge is noise, which nothing makes follow the force."""
     frequency = np.arange(1.0, 301.0)
     sines = frequency % 20 == 0
     frfs, conditions = recorded(frequency, "")

@@ -67,11 +67,8 @@ def repeated(period: Floats, times: int) -> tuple[Floats, Floats]:
 
 
 @pytest.mark.parametrize("kind", ["sweep", "noise"])
-def test_periodic_force_lowest_lines_right(kind: str) -> None:
-    """Of a periodic force the lowest lines are right too.
-
-    A straight line taken off each block would take a part of them, and a window's neighbours mix with them.
-    """
+def test_of_a_periodic_force_the_lowest_lines_are_right_too(kind: str) -> None:
+    """A straight line taken off each block would take a part of them, and a window's neighbours mix with them."""
     force, charge = repeated(swept(1000) if kind == "sweep" else 0.05 * np.random.default_rng(3).normal(size=1000), 8)
     drift = np.linspace(0, 1, len(force))
     frf = estimate(force - 0.3 * drift, charge + 4e-12 * drift, RATE)
@@ -156,11 +153,8 @@ def test_at_least_as_accurate_as_pyfrf(estimator: Estimator, drift: float) -> No
 
 
 @pytest.mark.parametrize(("natural_hz", "damping"), [(211.0, 0.004), (211.0, 0.05), (60.0, 0.2)])
-def test_resonance_mass_spring_read_magnitude(natural_hz: float, damping: float) -> None:
-    """The resonance of a mass on a spring is read from its magnitude.
-
-    Whatever the polarity and a delay do to the phase.
-    """
+def test_the_resonance_of_a_mass_on_a_spring_is_read_from_its_magnitude(natural_hz: float, damping: float) -> None:
+    """Whatever the polarity and a delay do to the phase."""
     frequency = np.geomspace(1.0, 1000.0, 120)
     ratio = frequency / natural_hz
     values = -3e-11 * np.exp(-2e-3j * frequency) / (1 - ratio**2 + 2j * damping * ratio)

@@ -68,11 +68,8 @@ def test_the_file_may_state_the_spring_constant_in_a_unit_of_its_own() -> None:
         read(table(RAW, ("k;soft", "")), spring_from("k"))
 
 
-def test_travel_deflection_signs_sensitivities() -> None:
-    """Travel and deflection have signs and sensitivities of their own.
-
-    A height that falls when pressing, and a photodiode whose volts fall: 25 nm/V is 0.04 V/nm.
-    """
+def test_travel_and_deflection_have_signs_and_sensitivities_of_their_own() -> None:
+    """A height that falls when pressing, and a photodiode whose volts fall: 25 nm/V is 0.04 V/nm."""
     raw = {"Height (um)": -TRAVEL_UM, "Diode (V)": -1e3 * DEFLECTION_UM / 25}
     for sensitivity, unit in ((25, "nm/V"), (0.04, "V/nm")):
         diode = {"channel": "Diode (V)", "sign": -1, "sensitivity": sensitivity, "sensitivity_unit": unit}
@@ -83,11 +80,8 @@ def test_travel_deflection_signs_sensitivities() -> None:
         the_curve(read(table(raw), channels))
 
 
-def test_heading_s_wrong_unit_overridden_rig() -> None:
-    """A heading s wrong unit is overridden by the rig that names it.
-
-    Its heading says nm and means um.
-    """
+def test_a_headings_wrong_unit_is_overridden_by_the_rig_that_names_it() -> None:
+    """Its heading says nm and means um."""
     text = table({"Depth (nm)": DEPTH_UM, "Force (uN)": FORCE_UN})
     confirmed = read(text, {**SIMPLE, "displacement_mm": {"channel": "Depth (nm)", "unit": "um"}})
     the_curve(confirmed)

@@ -99,11 +99,8 @@ def test_a_coarse_but_whole_sine_is_not_called_overloaded_or_held() -> None:
         assert defects("force_n", sine) == []
 
 
-def test_periodic_sweep_begins_anew_nothing() -> None:
-    """Where a periodic sweep begins anew nothing is damaged.
-
-    It jumps there in force and charge, at one distance; so do samples lost at the end of each buffer, which are.
-    """
+def test_where_a_periodic_sweep_begins_anew_nothing_is_damaged() -> None:
+    """It jumps there in force and charge, at one distance; so do samples lost at the end of each buffer, which are."""
     time = np.arange(1000) / RATE
     period = 1.0 + np.cos(2 * np.pi * (1.0 + 40.0 * time) * time + 0.7)
     force = np.tile(period, 8) + 1e-4 * np.random.default_rng(3).normal(size=8000)

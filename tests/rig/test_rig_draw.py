@@ -110,22 +110,16 @@ def test_quiet_raw_curves_show_nothing() -> None:
 
 
 @pytest.mark.soak
-def test_shows_told_although_fit_goes_astray() -> None:
-    """What shows is told although a fit goes astray.
-
-    On its way the base model's fit of this pair tries contacts wider than the rig has solved.
-    """
+def test_what_shows_is_told_although_a_fit_goes_astray() -> None:
+    """On its way the base model's fit of this pair tries contacts wider than the rig has solved."""
     truth = truth_of_curves(*drawn_curves(31001, 5, INDENTATION, "pair"))
     assert truth["identifiable"]
     assert np.isfinite(truth["chi2_gain_of_truth"])
 
 
 @pytest.mark.soak
-def test_effect_visible_without_no_fit() -> None:
-    """An effect is visible without which the others have no fit.
-
-    Without the stage that gives, a body that stiffens to infinity has no force at the recorded depth.
-    """
+def test_an_effect_is_visible_without_which_the_others_have_no_fit() -> None:
+    """Without the stage that gives, a body that stiffens to infinity has no force at the recorded depth."""
     truth = truth_of_curves(*drawn_curves(36036, 45, INDENTATION, "pair"))
     assert set(truth["effects"]) == {"instrument_compliance", "strain_stiffening"}
     assert truth["every_effect_identifiable"]

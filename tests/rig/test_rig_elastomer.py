@@ -71,11 +71,8 @@ def test_base_curves_are_hertz_s_and_neo_hookean() -> None:
     assert force == pytest.approx(E_MPA * np.pi / 4 * 20**2 * (stretch**-2 - stretch) / 3)
 
 
-def test_ramp_relaxes_hereditary_integral() -> None:
-    """A ramp relaxes as the hereditary integral.
-
-    Lee and Radok 1960: F(t) = ∫ E(t − s) d(c δ^(3/2)).
-    """
+def test_a_ramp_relaxes_as_the_hereditary_integral() -> None:
+    """Lee and Radok 1960: F(t) = ∫ E(t − s) d(c δ^(3/2))."""
     g, tau = 0.4, 5.0
     recorded, depth, force = curve("indentation", {"contact_creep": {"fraction": g, "time_s": tau}}, samples=400)
     time = np.array(recorded.entry["time_s"])
@@ -99,11 +96,8 @@ def test_slow_creep_has_no_memory_left() -> None:
 
 
 @pytest.mark.slow
-def test_adhesive_contact_tears_force_johnson() -> None:
-    """An adhesive contact tears at the force of johnson kendall and roberts.
-
-    Pull-off under displacement control comes after the least force, −(3/2)π w R; before contact there is none.
-    """
+def test_an_adhesive_contact_tears_at_the_force_of_johnson_kendall_and_roberts() -> None:
+    """Pull-off under displacement control comes after the least force, −(3/2)π w R; before contact there is none."""
     work = 5.0
     on = {"adhesion": {"work_j_per_m2": work}}
     _, depth, force = curve("indentation", on, samples=4000, largest_displacement_mm=0.6)
@@ -113,11 +107,8 @@ def test_adhesive_contact_tears_force_johnson() -> None:
     assert depth[going][force[going] < 0].min() < 0
 
 
-def test_base_below_thin_layer_stiffens_exact() -> None:
-    """The base below a thin layer stiffens it as the exact contact says.
-
-    By the integral equation, at a/h = 0.3 the force is 1.0197 times Hertz's at that a, δR/a² = 0.7945.
-    """
+def test_the_base_below_a_thin_layer_stiffens_it_as_the_exact_contact_says() -> None:
+    """By the integral equation, at a/h = 0.3 the force is 1.0197 times Hertz's at that a, δR/a² = 0.7945."""
     h, radius = 2.0, 5.0
     description = described("indentation", {"layered_contact": {}}, indenters_mm=[radius], samples=2000)
     description["skin"]["thickness_mm"] = h

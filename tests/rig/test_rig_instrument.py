@@ -25,11 +25,8 @@ def textbook(effects: Any = None, **curves: Any) -> tuple[Any, RecordedCurve]:
     return experiment, record_curves(experiment)[0]
 
 
-def test_textbook_case_instrument_writes() -> None:
-    """The textbook case is what an instrument writes.
-
-    7.5 µm, 1 MPa, 40 and 75 mJ/m², 3 N/m, 3,100 samples, air on both sides, pulled off at −(3/2) π w_s R.
-    """
+def test_the_textbook_case_is_what_an_instrument_writes() -> None:
+    """7.5 µm, 1 MPa, 40 and 75 mJ/m², 3 N/m, 3,100 samples, air on both sides, pulled off at −(3/2) π w_s R."""
     experiment, curve = textbook()
     kept = campaigns.parse(campaign_of_curves(experiment, [curve]))
     assert kept.units_checked

@@ -79,11 +79,8 @@ def test_a_sweep_has_the_frf_of_the_other_route() -> None:
     assert np.abs(frf.values / response.lines(frf.frequency)[0] - 1)[inside].max() < 0.01
 
 
-def test_sweep_begins_anew_nothing_folds_back() -> None:
-    """Where a sweep begins anew nothing folds back.
-
-    The force jumps there: without the converter's filter the lowest lines are off by a percent.
-    """
+def test_where_a_sweep_begins_anew_nothing_folds_back() -> None:
+    """The force jumps there: without the converter's filter the lowest lines are off by a percent."""
     drive = {"kind": "sweep", "duration_s": 8.0, "sample_rate_hz": 512.0, "low_hz": 1.0, "high_hz": 130.0}
     response, series = series_of(drive | {"charge_noise_pc": 0.0}, {"amplifier_high_pass": {"corner_hz": 1.0}})
     frf = estimate(series[0].force_n, series[0].charge_pc, 512.0)
@@ -99,11 +96,8 @@ def test_stepped_sine_has_the_frf_of_the_other_route() -> None:
     assert np.abs(frf.values / response.lines(frf.frequency)[0] - 1).max() < 3e-4
 
 
-def test_large_amplitude_shows_time_first() -> None:
-    """A large amplitude shows in time as its first harmonic.
-
-    The edge moves with the cycle: Fσ(F) at each instant has the first harmonic of the other route.
-    """
+def test_a_large_amplitude_shows_in_time_as_its_first_harmonic() -> None:
+    """The edge moves with the cycle: Fσ(F) at each instant has the first harmonic of the other route."""
     on = {"amplitude_nonlinearity": {"mobility": 1.0}}
     drive = {"kind": "stepped_sine", "steps": 6, "charge_noise_pc": 0.0002}
     response, series = series_of(drive, on, dynamic_n=0.8)

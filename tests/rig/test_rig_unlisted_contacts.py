@@ -42,11 +42,8 @@ def test_any_layer_against_the_exact_values(quantity: str) -> None:
         np.testing.assert_allclose(found, exact, atol=1e-7, err_msg=str(case))
 
 
-def test_flat_punch_increment_growing_hertz() -> None:
-    """A flat punch is the increment of a growing hertz contact.
-
-    d(F sigma)/dF at fixed radius of the sphere, where a grows as F^(1/3).
-    """
+def test_a_flat_punch_is_the_increment_of_a_growing_hertz_contact() -> None:
+    """d(F sigma)/dF at fixed radius of the sphere, where a grows as F^(1/3)."""
     a, step = np.array([0.1, 0.3, 0.6, 1.0, 1.5, 2.0]), 1e-4
     up, down = ((1.0 + s) * sigma(a * np.cbrt(1.0 + s), 0.6, 0.2) for s in (step, -step))
     edge = base_stress(punch_transform(transfer()[0] * a[:, None]), 0.6, 0.2)

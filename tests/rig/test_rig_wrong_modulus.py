@@ -50,11 +50,8 @@ def test_the_truth_has_the_contacts_as_declared() -> None:
 
 
 @pytest.mark.slow
-def test_contacts_computed_beyond_made() -> None:
-    """Some contacts are computed beyond what was made.
-
-    By the declared E wider or harder pressed than the rig can calculate, and than the tables hold.
-    """
+def test_some_contacts_are_computed_beyond_what_was_made() -> None:
+    """By the declared E wider or harder pressed than the rig can calculate, and than the tables hold."""
     beyond = 0
     numbers = range(20) if SOAK else (0, 4, 5, 7)  # quickly drawn
     for number in numbers:

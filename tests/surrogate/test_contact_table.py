@@ -75,11 +75,8 @@ def contacts(table: ContactTable) -> Contacts:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("radius", "load"), first(1, [(1.6, 0.1), (4.0, 0.05), (1.6, 0.01), (0.5, 0.1)]))
-def test_independent_code_finds_contact(contacts: Contacts, radius: float, load: float) -> None:
-    """An independent code finds the same contact.
-
-    FElupe at the table's indentation: the force (3 G = E), the contact radius to its mesh, and the stress.
-    """
+def test_an_independent_code_finds_the_same_contact(contacts: Contacts, radius: float, load: float) -> None:
+    """FElupe at the table's indentation: the force (3 G = E), the contact radius to its mesh, and the stress."""
     contact = contacts.at(3 * load * radius**2, radius)
     rho = RHO[1:4]
     force, a, sigma = felupe_contact.press(radius, contact.indentation, contact.a, rho.tolist())
@@ -122,11 +119,8 @@ def test_a_small_contact_is_the_sigma_tables(contacts: Contacts) -> None:
 
 
 @pytest.mark.parametrize(("load", "most"), [(0.001, 0.006), (0.01, 0.013), (0.1, 0.03)])
-def test_finite_strain_adds_little_beneath(contacts: Contacts, load: float, most: float) -> None:
-    """Finite strain adds little beneath a sphere.
-
-    Less than under Hertz' pressure as a dead load; what README.md and the findings of /v1/stress say.
-    """
+def test_finite_strain_adds_little_beneath_a_sphere(contacts: Contacts, load: float, most: float) -> None:
+    """Less than under Hertz' pressure as a dead load; what README.md and the findings of /v1/stress say."""
     for radius in np.geomspace(0.5, 8, 7):
         contact = contacts.at(3 * load * radius**2, float(radius))
         assert np.abs(contact.sigma / contact.linear_sigma - 1).max() < 1.02 * most

@@ -115,11 +115,8 @@ def test_the_elements_converge_to_the_exact_layer(poisson_ratio: float, slip: fl
     assert all(coarse > 3 * fine for coarse, fine in pairwise(errors))
 
 
-def test_load_balance_base_bears() -> None:
-    """A load in balance is all that the base bears.
-
-    ∫ T̄ over the places of a sensor is −F3 but for what lies beyond the reach, below 2e-4 of it.
-    """
+def test_a_load_in_balance_is_all_that_the_base_bears() -> None:
+    """∫ T̄ over the places of a sensor is −F3 but for what lies beyond the reach, below 2e-4 of it."""
     influence = TABLE.at(0.5)
     assert influence is not None
     x, weight = np.polynomial.legendre.leggauss(80)
@@ -167,11 +164,8 @@ def test_a_map_of_the_hertz_pressure_gives_the_contact(cells: int) -> None:
     assert found == pytest.approx(contact, rel=1.5 / cells)
 
 
-def test_uniform_pressure_over_wide_cells() -> None:
-    """Uniform pressure over wide cells is integrated within them.
-
-    Cells twice as wide as the layer is thick give what a map of narrow ones gives.
-    """
+def test_uniform_pressure_over_wide_cells_is_integrated_within_them() -> None:
+    """Cells twice as wide as the layer is thick give what a map of narrow ones gives."""
     influence = TABLE.at(0.6)
     assert influence is not None
     sensors = np.array([[0.3, 0.0], [2.0, 1.0]])

@@ -19,11 +19,8 @@ def test_reference_values() -> None:
     )
 
 
-def test_half_space_error_falls_depth_substrate() -> None:
-    """Half space error falls with the depth of the substrate.
-
-    At (0.289, 0.2) in units of the sensor's depth, with the substrate at the sensor: −34.7 %.
-    """
+def test_half_space_error_falls_with_the_depth_of_the_substrate() -> None:
+    """At (0.289, 0.2) in units of the sensor's depth, with the substrate at the sensor: −34.7 %."""
     error = half_space.sigma(0.289, 0.2) / linear_layer.sigma(0.289, 0.2) - 1
     assert error == pytest.approx(-0.347, abs=5e-4)
 
@@ -43,11 +40,8 @@ def test_influence_of_a_point_force_equals_the_oracle() -> None:
 
 
 @NEEDS_ORACLE
-def test_moving_edge_increment_flat_punch() -> None:
-    """The moving edge increment is a flat punch.
-
-    σ + (a/3) ∂σ/∂a equals the stress under the flat punch's pressure (Johnson 1985, section 3.4).
-    """
+def test_the_moving_edge_increment_is_a_flat_punch() -> None:
+    """σ + (a/3) ∂σ/∂a equals the stress under the flat punch's pressure (Johnson 1985, section 3.4)."""
     rho, a, offset, value = linear_layer_values("sigma_edge")
     punch = normal_stress(linear_layer.transmission, punch_transform, a, rho, offset)
     assert punch == pytest.approx(value, abs=3e-8)

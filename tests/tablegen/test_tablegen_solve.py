@@ -35,11 +35,8 @@ def test_linear_limit_is_the_exact_layer(a: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [3, 4])
-def test_convergence_rate_stress_base(order: int) -> None:
-    """Convergence rate of the stress on the base.
-
-    Stresses of elements of order k converge like h^k in the mean square, here on the base under a wide contact.
-    """
+def test_convergence_rate_of_the_stress_on_the_base(order: int) -> None:
+    """Stresses of elements of order k converge like h^k in the mean square, here on the base under a wide contact."""
     errors = []
     for refinement in (1, 2):
         layer = NonlinearLayer(discretise(layer_mesh(1.0, refinement), order))
@@ -126,11 +123,8 @@ def after_newton_step(layer: NonlinearLayer, state: State, load: Floats) -> Stat
 
 
 @pytest.mark.slow
-def test_change_grows_like_cube_root_load() -> None:
-    """Change grows like the cube root of the load.
-
-    σ(L) − σ(0) ∝ L^(1/3) as L → 0, so that the table's axis is smooth.
-    """
+def test_change_grows_like_the_cube_root_of_the_load() -> None:
+    """σ(L) − σ(0) ∝ L^(1/3) as L → 0, so that the table's axis is smooth."""
     column = solve_column(0.5, nodes(1e-6, 8e-6), order=4)
     assert column.sigma_change[3, 2] / column.sigma_change[3, 1] == pytest.approx(2.0, rel=0.01)
 
