@@ -16,7 +16,6 @@ from tests.support.mechanism_campaigns import (
     compression_campaign,
     fit_of,
     hertz_force,
-    indentation_campaign,
     predicted,
     table,
 )
@@ -128,15 +127,6 @@ def test_stiffening_contact(form: float, exponent: float, law: Callable[[Floats]
     assert small == pytest.approx(hertz_force(shallow, R_MM, E_MPA), rel=1e-3)
 
 
-def test_a_held_indentation_relaxes_to_what_is_left() -> None:
-    depth = np.append(np.linspace(0, 0.3, 2000), np.full(8, 0.3))
-    time = np.append(np.linspace(0, 1e-4, 2000), 1e-4 + np.array([1, 2, 5, 10, 20, 50, 100, 1000.0]))
-    values = {"relaxed_fraction": 0.4, "relaxation_time": 10.0}
-    found = force_at(["contact_creep"], depth, time, **values)
-    elastic = hertz_force(np.array(0.3), R_MM, E_MPA)
-    assert found[-8:] == pytest.approx(elastic * (1 - 0.4 * (1 - np.exp(-time[-8:] / 10.0))), rel=1e-4)
-
-
 def test_what_relaxes_and_stiffens_is_stiffer_by_the_contact_of_the_moment() -> None:
     """On the way in and in a hold; on the way back the contact is that of Ting's law, smaller than in equilibrium."""
     depth = np.concatenate([np.linspace(0.01, 0.5, 50), np.full(20, 0.5), np.linspace(0.49, 0.2, 30)])
@@ -165,17 +155,6 @@ def test_a_ramp_of_force_relaxes_as_its_closed_form() -> None:
     ratio = relaxed[1:200] / predicted([], recorded, **begins)[1:200]
     memory = 1 - (1 - np.exp(-time[1:] / 8.0)) * 8.0 / time[1:]
     assert ratio == pytest.approx(1 - 0.5 * memory, rel=1e-4)  # so little strain is linear to that
-
-
-def test_a_body_that_relaxed_is_softer_on_the_way_back() -> None:
-    recorded = indentation_campaign()
-    force = predicted(["contact_creep"], recorded, relaxed_fraction=0.5, relaxation_time=3.0)[:106]
-    curve = recorded.recordings[0]
-    assert isinstance(curve, IndentationRecording)
-    depth = curve.displacement_mm
-    for level in (0.1, 0.2, 0.3):
-        loading, unloading = np.interp(level, depth[:46], force[:46]), np.interp(-level, -depth[56:], force[56:])
-        assert unloading < loading
 
 
 def cylinder(strain: Floats) -> Campaign:

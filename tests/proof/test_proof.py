@@ -86,6 +86,7 @@ def test_drawn_cases_tell_nothing_of_the_truth() -> None:
     assert document["skin"]["d33_pc_per_n"] is None
 
 
+@pytest.mark.slow
 def test_every_effect_that_is_drawn_can_be_supposed_where_it_is() -> None:
     """The ideal diagnoser's laws reach the parameters that the rig draws, and no others of the same name."""
     for number in range(60 if SOAK else 40):

@@ -16,6 +16,7 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import parse
 
 
+@pytest.mark.slow
 def test_wide_tails_go_beyond_the_usual_ones_and_have_arrays_of_two() -> None:
     usual, wide = ([drawn(11, number, "none", tails) for number in range(80)] for tails in ("usual", WIDE))
     assert max(one["noise"]["gain"] for one in usual) <= 0.05 < max(one["noise"]["gain"] for one in wide) <= 0.08

@@ -120,6 +120,7 @@ def test_the_hammers_wrong_label_is_not_accepted_silently() -> None:
             read_file(file, file.name, rig_description.from_dict({**document, "channels": channels}))
 
 
+@pytest.mark.slow
 def test_the_same_sound_as_text_and_as_binary() -> None:
     (text,), (binary,) = real("uff-files/Sample_UFF58_ascii.uff"), real("uff-files/Sample_UFF58b_bin.uff")
     sounds = []
