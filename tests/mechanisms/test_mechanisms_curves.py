@@ -1,6 +1,5 @@
 """Mechanisms of indentation and compression curves against exact laws, independent values and measured silicones."""
 
-import csv
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -19,7 +18,7 @@ from tests.support.mechanism_campaigns import (
     predicted,
     table,
 )
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import sphere_rows
 from tests.support.sphere_contact import SphereOnLayer
 from underskin.mechanisms import Normal, compose
 from underskin.physics.elastic_layer import Layer
@@ -59,10 +58,8 @@ def test_where_no_modulus_is_declared_it_is_free_and_found_by_hertz() -> None:
     assert model.predict(start).value == pytest.approx(hertz_force(DEPTH, R_MM, E_MPA), abs=2e-3)
 
 
-@NEEDS_ORACLE
 def test_the_layer_pushes_back_as_the_independent_contact_says() -> None:
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "sphere_on_layer.csv").open(newline="") as file:
-        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    rows = sphere_rows()
     a = H_MM * np.array([row["a_over_h"] for row in rows])
     depth = a**2 / R_MM * [row["indentation_r_over_a2"] for row in rows]
     force = 4 / 3 * E_MPA / 0.75 * a**3 / R_MM * [row["force_over_hertz"] for row in rows]

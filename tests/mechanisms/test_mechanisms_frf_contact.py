@@ -13,13 +13,12 @@ from tests.mechanisms.mechanism_contacts import (
     RHO,
     E,
     H,
+    contacts_within_the_table,
     level,
     linear_contact,
-    oracle_rows,
-    sphere_on_layer,
 )
 from tests.support.mechanism_campaigns import SKIN, campaign, frf_recording, predicted, table
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows
 from tests.support.sphere_contact import SphereOnLayer
 from underskin.mechanisms import compose
 from underskin.physics import hertz
@@ -28,9 +27,8 @@ from underskin.physics.hankel_transform import hertz_transform, normal_stress, p
 from underskin.surrogate.hdf5_format import load_contact
 
 
-@NEEDS_ORACLE
 def test_a_moving_edge_feels_the_flat_punch() -> None:
-    rows = oracle_rows("sigma_edge", poisson_ratio="0.5", glue_stiffness_h_over_2g="inf", rt_over_h="0.6")
+    rows = layer_rows("sigma_edge", poisson_ratio="0.5", glue_stiffness_h_over_2g="inf", rt_over_h="0.6")
     assert rows
     for row in rows:
         a, offset = float(row["a_over_h"]), float(row["offset_over_h"])
@@ -71,9 +69,8 @@ def test_half_a_moving_edge_is_half_way() -> None:
     assert half == pytest.approx((still + moving) / 2, rel=1e-12)
 
 
-@NEEDS_ORACLE
 def test_a_layered_contact_has_the_layers_radius_and_pressure() -> None:
-    for row in sphere_on_layer():
+    for row in contacts_within_the_table():
         a = row["a_over_h"]
         on_half_space = linear_contact(a)
         pressed = replace(on_half_space, preload_n=on_half_space.preload_n * row["force_over_hertz"])

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.mechanisms.mechanism_contacts import E, H, level, linear_contact, sphere_on_layer
+from tests.mechanisms.mechanism_contacts import E, H, contacts_within_the_table, level, linear_contact
 from tests.support.mechanism_campaigns import campaign, fit_of, frf_recording, predicted, table
-from tests.support.oracle import NEEDS_ORACLE
 from underskin.mechanisms import compose
 from underskin.physics import charge_response
 
@@ -51,9 +50,8 @@ def test_crosstalk_adds_what_the_neighbours_feel() -> None:
         assert found == pytest.approx(expected, rel=1e-6)
 
 
-@NEEDS_ORACLE
 def test_the_tip_resonates_on_the_layers_contact() -> None:
-    for row in sphere_on_layer():
+    for row in contacts_within_the_table():
         recording = linear_contact(row["a_over_h"])
         stiffness = 2 * E / 0.75 * row["a_over_h"] * H * row["stiffness_over_hertz"]
         frequency = np.sqrt(stiffness / 5e-3) / (2 * np.pi)

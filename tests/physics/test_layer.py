@@ -1,14 +1,10 @@
 """The layer of any Poisson ratio and glue line: independent values (good to about 5e-10), limits, derivatives."""
 
-import csv
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tablegen import linear_layer
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows
 from underskin.errors import InvalidInput
 from underskin.physics import elastic_layer
 from underskin.physics.elastic_layer import Layer, slip
@@ -23,12 +19,10 @@ FUNCTIONS = ["transmission", "tangential_transmission", "compliance", "stiffenin
 def _oracle(quantity: str) -> dict[Layer, Floats]:
     """Columns rt_over_h, a_over_h, offset_over_h and value, (4, rows), of every layer; κ is twice the file's column."""
     rows: dict[Layer, list[list[float]]] = {}
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "linear_layer.csv").open(newline="") as file:
-        for row in csv.DictReader(file):
-            if row["quantity"] == quantity:
-                body = Layer(float(row["poisson_ratio"]), slip(2 * float(row["glue_stiffness_h_over_2g"])))
-                names = ("rt_over_h", "a_over_h", "offset_over_h", "value")
-                rows.setdefault(body, []).append([float(row[name] or "nan") for name in names])
+    for row in layer_rows(quantity):
+        body = Layer(float(row["poisson_ratio"]), slip(2 * float(row["glue_stiffness_h_over_2g"])))
+        names = ("rt_over_h", "a_over_h", "offset_over_h", "value")
+        rows.setdefault(body, []).append([float(row[name] or "nan") for name in names])
     return {body: np.array(values).T for body, values in rows.items()}
 
 
@@ -36,7 +30,6 @@ def _punch_sigma(body: Layer, a: Floats, rho: Floats) -> Floats:
     return normal_stress(lambda k: body.transmission(k).value, punch_transform, a, rho)
 
 
-@NEEDS_ORACLE
 @pytest.mark.parametrize(
     ("quantity", "layers"), [("sigma_hertz", 8), ("sigma_edge", 8), ("gamma_n", 8), ("gamma_t", 5)]
 )

@@ -1,9 +1,6 @@
 """The rig's own physics against exact values, limits and other routes; nothing of it is shared with the library."""
 
-import csv
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,28 +16,20 @@ from rig.layer_contacts import LayerContacts
 from rig.recorded import make_response
 from rig.true_response import TrueResponse
 from tests.support.cases import first
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows, sphere_rows
 from tests.support.rig_experiments import PARAMETERS, described
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 
 RHO = 0.6
 
 
-def rows(file: str) -> list[dict[str, str]]:
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / file).open(newline="") as stream:
-        return list(csv.DictReader(stream))
-
-
 def number(cell: str) -> float:
     return float(cell or 0.0)
 
 
-@NEEDS_ORACLE
 def test_stress_on_the_base_is_exact_for_every_layer() -> None:
     layers: dict[tuple[float, float], np.ndarray] = {}
-    for row in rows("linear_layer.csv"):
-        if row["quantity"] not in ("sigma_hertz", "gamma_n"):
-            continue
+    for row in layer_rows("sigma_hertz", "gamma_n"):
         kind = number(row["poisson_ratio"]), 2 * float(row["glue_stiffness_h_over_2g"])
         if kind not in layers:
             layers[kind] = Layer(*kind).transmission(WAVENUMBERS)
@@ -50,17 +39,16 @@ def test_stress_on_the_base_is_exact_for_every_layer() -> None:
     assert len(layers) == 8
 
 
-@NEEDS_ORACLE
 def test_sphere_on_the_layer_is_exact() -> None:
     contact = sphere_contact(Layer())
-    for row in rows("sphere_on_layer.csv"):
-        a, radius = np.array([float(row["a_over_h"])]), 10.0
+    for row in sphere_rows():
+        a, radius = np.array([row["a_over_h"]]), 10.0
         hertz_force, hertz_stiffness = 4 / 3 / 0.75 * a**3 / radius, 2 * a / 0.75
-        assert contact.force(a, radius, 1.0) / hertz_force == pytest.approx(float(row["force_over_hertz"]), rel=2e-5)
+        assert contact.force(a, radius, 1.0) / hertz_force == pytest.approx(row["force_over_hertz"], rel=2e-5)
         depth = contact.depth(a, radius, 1.0) * radius / a**2
-        assert depth == pytest.approx(float(row["indentation_r_over_a2"]), rel=1e-5)
+        assert depth == pytest.approx(row["indentation_r_over_a2"], rel=1e-5)
         stiffness = contact.stiffness(a, 1.0) / hertz_stiffness
-        assert stiffness == pytest.approx(float(row["stiffness_over_hertz"]), rel=1e-6)
+        assert stiffness == pytest.approx(row["stiffness_over_hertz"], rel=1e-6)
 
 
 def test_stiffness_is_the_slope_of_force_over_depth() -> None:

@@ -8,7 +8,7 @@ import pytest
 from rig.unlisted.contact_pressure import adhesive_contact, force_over_hertz, layered_contact
 from rig.unlisted.elastic_layer import layer_transfer
 from rig.unlisted.layer import base_stress, hertz_radius, hertz_transform, punch_transform, sigma, transfer
-from tests.support.oracle import oracle_rows
+from tests.support.oracle import layer_rows
 
 
 def test_bonded_incompressible_layer_is_the_closed_form() -> None:
@@ -18,7 +18,7 @@ def test_bonded_incompressible_layer_is_the_closed_form() -> None:
 @pytest.mark.parametrize("quantity", ["sigma_hertz", "sigma_edge"])
 def test_any_layer_against_the_exact_values(quantity: str) -> None:
     """The oracle's glue stiffness is kappa/2."""
-    rows = [r for r in oracle_rows("linear_layer.csv") if r["quantity"] == quantity]
+    rows = layer_rows(quantity)
     form = hertz_transform if quantity == "sigma_hertz" else punch_transform
     for case in sorted({(r["poisson_ratio"], r["glue_stiffness_h_over_2g"]) for r in rows}):
         same = [r for r in rows if (r["poisson_ratio"], r["glue_stiffness_h_over_2g"]) == case]

@@ -15,25 +15,17 @@ from rig.unlisted.layer import (
     transfer,
 )
 from rig.unlisted.response import REFERENCE_HZ, MinimumPhase, frequency_law
-from tests.support.oracle import oracle_rows
+from tests.support.oracle import linear_layer_values, sphere_rows
 
 
 def test_sigma_against_the_exact_layer() -> None:
-    rows = [
-        r
-        for r in oracle_rows("linear_layer.csv")
-        if (r["quantity"], r["poisson_ratio"], r["glue_stiffness_h_over_2g"]) == ("sigma_hertz", "0.5", "inf")
-    ]
-    a, rho, e, exact = (
-        np.array([float(r[k]) for r in rows]) for k in ("a_over_h", "rt_over_h", "offset_over_h", "value")
-    )
-    assert len(rows) > 200
+    rho, a, e, exact = linear_layer_values("sigma_hertz")
+    assert len(a) > 200
     np.testing.assert_allclose(sigma(a, rho, e), exact, atol=5e-8)
 
 
 def test_stiffness_against_the_exact_sphere() -> None:
-    rows = oracle_rows("sphere_on_layer.csv")
-    a, exact = (np.array([float(r[k]) for r in rows]) for k in ("a_over_h", "stiffness_over_hertz"))
+    a, exact = (np.array([row[name] for row in sphere_rows()]) for name in ("a_over_h", "stiffness_over_hertz"))
     np.testing.assert_allclose(stiffness_ratio(a), exact, rtol=1e-6)
 
 

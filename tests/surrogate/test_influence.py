@@ -1,7 +1,5 @@
 """The influence table: the exact linear layer for every skin, fields of pressure, and what lies outside."""
 
-import csv
-import os
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +10,7 @@ import pytest
 from bench.soak import SOAK
 from tablegen.influence import solve_influence
 from tablegen.influence_table import make_influence_table
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows
 from underskin import TableError
 from underskin.array_stress.load_integration import Load, array_stress, contact_load, pressure_map_loads
 from underskin.physics import elastic_layer
@@ -39,11 +37,6 @@ def hertz_load(a: float, place: Floats) -> Load:
     return contact_load(place, (0.0, 0.0, 1.0), SpherePressure(a, HERTZ_SHAPE), 1.0)
 
 
-def oracle_rows(*quantities: str) -> list[dict[str, str]]:
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "linear_layer.csv").open(newline="") as file:
-        return [row for row in csv.DictReader(file) if row["quantity"] in quantities]
-
-
 def numbers(row: dict[str, str]) -> tuple[float, float, float, float, float]:
     """ν, slip, ρ, r̂/h and the value of a row; its glue stiffness is κ/2."""
     names = ("poisson_ratio", "rt_over_h", "offset_over_h", "value")
@@ -52,11 +45,10 @@ def numbers(row: dict[str, str]) -> tuple[float, float, float, float, float]:
 
 
 @pytest.mark.slow
-@NEEDS_ORACLE
 @pytest.mark.parametrize("quantity", ["gamma_n", "gamma_t"])
 def test_point_forces_equal_the_oracle(quantity: str) -> None:
     found, exact = [], []
-    for poisson_ratio, slip, rho, offset, value in map(numbers, oracle_rows(quantity)):
+    for poisson_ratio, slip, rho, offset, value in map(numbers, layer_rows(quantity)):
         influence = TABLE.at(rho, poisson_ratio, slip)
         assert influence is not None
         found.append(float(getattr(influence, quantity)(offset)))
@@ -65,10 +57,9 @@ def test_point_forces_equal_the_oracle(quantity: str) -> None:
     assert_accurate(np.array(found), np.array(exact))
 
 
-@NEEDS_ORACLE
 def test_the_hertz_pressure_beside_the_sensor_equals_the_oracle() -> None:
     found, exact = [], []
-    for row in oracle_rows("sigma_hertz")[:: 1 if SOAK else 4]:
+    for row in layer_rows("sigma_hertz")[:: 1 if SOAK else 4]:
         poisson_ratio, slip, rho, offset, value = numbers(row)
         influence = TABLE.at(rho, poisson_ratio, slip)
         assert influence is not None

@@ -11,7 +11,7 @@ import pytest
 
 from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
-from tests.support.oracle import NEEDS_ORACLE, linear_layer_values
+from tests.support.oracle import linear_layer_values
 from underskin import TableError, load_table
 from underskin.surrogate.hdf5_format import data_hash, read_table, tables_folder
 from underskin.surrogate.sigma_table import SigmaTable
@@ -21,7 +21,6 @@ GENERATOR = np.random.default_rng(2018)
 SOAK = "UNDERSKIN_SOAK" in os.environ
 
 
-@NEEDS_ORACLE
 def test_linear_limit_equals_the_oracle() -> None:
     rho, a, offset, value = linear_layer_values("sigma_hertz")
     used = (offset == 0) & (value > 0.01) & (a <= 3) & (rho <= 3)
