@@ -123,8 +123,7 @@ def test_no_modulus_before_a_relaxation_that_nothing_follows() -> None:
     assert report.verdict == "ambiguous"
 
 
-def test_pulled_strip_told_without_spheres() -> None:
-    """A pulled strip is told of without spheres."""
+def test_a_pulled_strip_is_told_of_without_spheres() -> None:
     strain = -np.linspace(0.0, 2.0, 120)
     stretch = 1 - strain
     stiffens = neo_hookean(strain) * (1 + 0.2 * (stretch**2 + 2 / stretch - 3))
@@ -187,8 +186,7 @@ def test_a_declared_layer_is_no_guess() -> None:
     assert "0.1 of the thickness" in report.statement
 
 
-def test_layer_unknown_thickness_not_told() -> None:
-    """A layer of unknown thickness is not told from stiffening."""
+def test_a_layer_of_unknown_thickness_is_not_told_from_stiffening() -> None:
     depth = ways(-0.05, 0.2, samples=400)
     report = diagnosed(campaign(depth, pressed(depth, bonded_layer(2.0, 2.0)), timed=False))
     assert report.verdict == "ambiguous"
@@ -320,8 +318,7 @@ def test_a_sphere_pressed_deep_lacks_nothing() -> None:
 
 
 @pytest.mark.parametrize("skin", first(1, [{"thickness_mm": 20.0, "youngs_modulus_mpa": 1.0}, {}]))
-def test_flat_punch_stated_sphere_concludes(skin: dict[str, float]) -> None:
-    """A flat punch stated as a sphere concludes nothing."""
+def test_a_flat_punch_stated_as_a_sphere_concludes_nothing(skin: dict[str, float]) -> None:
     depth = ways(-0.1, 0.3, samples=400)
     report = diagnosed(
         campaign(depth, pressed(depth, lambda at: 8 / 3 * at), timed=False, skin=skin, indenter_radius_mm=1.0)
@@ -330,8 +327,7 @@ def test_flat_punch_stated_sphere_concludes(skin: dict[str, float]) -> None:
     assert "flat punch" in report.statement
 
 
-def test_cone_stated_sphere_explains_nothing() -> None:
-    """A cone stated as a sphere explains nothing for certain."""
+def test_a_cone_stated_as_a_sphere_explains_nothing_for_certain() -> None:
     depth = ways(-0.1, 0.3, samples=120)
     curve = campaign(depth, pressed(depth, lambda at: at**2), timed=False, indenter_radius_mm=5.0)
     report = diagnosed(curve)
@@ -375,11 +371,8 @@ def test_a_pull_off_without_a_jump_is_an_event() -> None:
     assert float(comes_off[2]) == pytest.approx(-0.1 * press.max(), rel=0.1)
 
 
-def test_not_tried_said_missing() -> None:
-    """What was not tried is said right after the verdict where it may be missing.
-
-    A hold of what relaxes, without times: creep is not tried, and the statement says why.
-    """
+def test_what_was_not_tried_is_said_right_after_the_verdict_where_it_may_be_missing() -> None:
+    """A hold of what relaxes, without times: creep is not tried, and the statement says why."""
     depth = np.concatenate([ways(-0.1, 0.3, samples=80), np.full(160, 0.3), ways(0.3, -0.1, samples=80)])
     force = force_of_elements(Body(2e-3, 1e6 / 0.75, 0.8, 0.8), depth * 1e-3, 0.02 * np.arange(float(len(depth))))
     report = diagnosed(campaign(depth, force, timed=False), "contact_creep")
