@@ -22,8 +22,7 @@ import orjson
 from rig.description import parse as experiment
 from rig.recorded import campaign as campaign_of
 from rig.recorded import record_lines
-from service.routes import campaigns, design, mechanisms, pressed_skin, sigma, stress
-from service.routes import field as stress_field
+from service.routes import campaigns, computed, mechanisms
 
 FILE = Path(__file__).parents[1] / "service" / "routes" / "examples.json"
 _EXPERIMENT: dict[str, Any] = {
@@ -100,12 +99,12 @@ def _calculations(walked: Walk) -> None:
     walked.ask("sigma_one", "GET", "/v1/sigma", params=point)
     csv = walked.http.get("/v1/sigma", params=point, headers={"Accept": "text/csv"})
     walked.examples["sigma_one"]["csv"] = csv.text
-    walked.columns("sigma_columns", "/v1/sigma", sigma.EXAMPLE)
-    walked.columns("frf_columns", "/v1/frf", pressed_skin.FRF_EXAMPLE)
-    walked.columns("d33_columns", "/v1/d33", pressed_skin.D33_EXAMPLE)
-    walked.columns("stress", "/v1/stress", stress.EXAMPLE)
-    walked.ask("field", "GET", "/v1/field", params=stress_field.EXAMPLE)
-    walked.ask("design", "POST", "/v1/design", design.EXAMPLE)
+    walked.columns("sigma_columns", "/v1/sigma", computed.SIGMA_EXAMPLE)
+    walked.columns("frf_columns", "/v1/frf", computed.FRF_EXAMPLE)
+    walked.columns("d33_columns", "/v1/d33", computed.D33_EXAMPLE)
+    walked.columns("stress", "/v1/stress", computed.STRESS_EXAMPLE)
+    walked.ask("field", "GET", "/v1/field", params=computed.FIELD_EXAMPLE)
+    walked.ask("design", "POST", "/v1/design", computed.DESIGN_EXAMPLE)
     walked.ask("tables", "GET", "/v1/tables")
     walked.ask("health", "GET", "/health")
     walked.ask("ready", "GET", "/ready")

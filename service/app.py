@@ -4,14 +4,14 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from anyio import to_thread
-from fastapi import Depends, FastAPI, Security
+from fastapi import Depends, FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
 from service import pages
 from service.auth.access_control import AccessControl
 from service.auth.login_throttle import LoginThrottle
-from service.dependencies import authorised
+from service.dependencies import MAY_CHANGE
 from service.ingest.uploads import UploadFolder
 from service.jobs.planner import Planner
 from service.jobs.process import WorkerProcesses
@@ -24,20 +24,14 @@ from service.pages.upload.pending_uploads import PendingUploads
 from service.routes import (
     campaigns,
     changes,
-    design,
+    computed,
     diagnoses,
     exports,
-    field,
     health,
     mechanisms,
-    metrics,
     models,
     openapi,
-    pressed_skin,
-    sigma,
     skins,
-    stress,
-    tables,
     umbridge,
 )
 from service.routes.query_guard import known_query
@@ -82,6 +76,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
         redoc_url=None,
         openapi_url=None,
         lifespan=_lifespan,
+        generate_unique_id_function=lambda route: route.name,  # the functions are called as their operations
     )
     api.state.settings = settings
     api.state.document = openapi.document
@@ -98,7 +93,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
         settings.diagnosis_seconds,
         keeps_ready=settings.diagnosis_ready,
     )
-    metrics.watch_disk(settings.data)
+    health.watch_disk(settings.data)
     api.state.runner = Runner(store, processes, settings.diagnosis_workers)
     api.state.backups = (
         None
@@ -108,11 +103,12 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
     # Each on its own: FastAPI prepares the routes of a router within a router once more.
-    guards = [Security(authorised, scopes=["read"]), Depends(known_query)]
+    guards = [MAY_CHANGE, Depends(known_query)]
+    api.include_router(computed.router, dependencies=[Depends(known_query)])
     of_skins = (campaigns, diagnoses, exports, skins, changes, models)
-    for noun in (sigma, pressed_skin, stress, field, design, tables, *of_skins, mechanisms):
+    for noun in (*of_skins, mechanisms):
         api.include_router(noun.router, dependencies=guards)
-    for router in (umbridge.router, health.router, metrics.router, openapi.router):
+    for router in (umbridge.router, health.router, openapi.router):
         api.include_router(router)
     pages.add_to(api)
     return api
@@ -124,5 +120,5 @@ def _methods(api: FastAPI, path: str) -> list[str]:
 
 def create_app(settings: Settings, table: SigmaTable, access: AccessControl, store: Database) -> ASGIApp:
     """What the server runs."""
-    hot = {("GET", "/v1/sigma"): sigma.hot_route(table), ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table)}
+    hot = {("GET", "/v1/sigma"): computed.hot_route(table), ("POST", "/umbridge/Evaluate"): umbridge.hot_route(table)}
     return AsgiMiddleware(create_api(settings, table, access, store), access, hot, problem_page)

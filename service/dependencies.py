@@ -3,10 +3,9 @@
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any
 
-from fastapi import Depends, Path, Request, Security
-from fastapi.security import SecurityScopes
+from fastapi import Depends, Path, Query, Request
 
-from service.auth.access_control import SAFE
+from service.auth.access_control import SAFE, AccessControl
 from service.auth.keys import Key
 from service.jobs.planner import Planner
 from service.jobs.runner import Runner
@@ -28,6 +27,7 @@ def _of_app(name: str) -> Callable[[Request], Awaitable[Any]]:
 Table = Annotated[SigmaTable, Depends(_of_app("table"))]
 RunnerInUse = Annotated[Runner, Depends(_of_app("runner"))]
 PlannerInUse = Annotated[Planner, Depends(_of_app("planner"))]
+Access = Annotated[AccessControl, Depends(_of_app("access"))]
 # For routes that keep nothing, whatever their method.
 StoreToRead = Annotated[Database, Depends(_of_app("store"))]
 
@@ -44,19 +44,22 @@ Store = Annotated[Database, Depends(_store)]
 CampaignId = Annotated[str, Path(description="Id of a campaign, as it was answered when it was sent.")]
 DiagnosisId = Annotated[str, Path(description="Id of a diagnosis, as it was answered when it was asked for.")]
 SkinId = Annotated[str, Path(description="Id of a skin.")]
+Limit = Annotated[int, Query(ge=1, le=200, description="How many on a page.")]
+Cursor = Annotated[str | None, Query(description="`next` of the page before.")]
 
 
-def authorised(scopes: SecurityScopes, request: Request) -> None:
-    """Rejects a key of too narrow a scope; whether a key is required was checked before."""
+def _may_change(request: Request) -> None:
+    """Rejects a request to change what is kept if its key has scope read; whether a key is required was checked
+    before."""
     key: Key | None = request.scope["key"]
-    if key is not None and "write" in scopes.scopes and key.scope != "write":
+    if request.method not in SAFE and key is not None and key.scope != "write":
         raise Refusal(
             403,
             f"Key {key.name!r} has scope read; this needs one of scope write: underskin key create NAME --scope write",
         )
 
 
-WRITE = [Security(authorised, scopes=["write"])]
+MAY_CHANGE = Depends(_may_change)  # of every route but those whose POST only computes
 
 
 def sender(request: Request) -> str | None:

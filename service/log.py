@@ -9,6 +9,7 @@ from typing import Any
 
 import orjson
 
+logger = logging.getLogger("underskin")
 KEY = re.compile(r"us_[\w-]{16,}")  # a text that looks like a key, wherever it is
 
 
@@ -50,8 +51,7 @@ class LastingFailure:
     """Logs a repeating failure once per cause and duration; shared by threads with the same cause, such as a store
     that does not answer."""
 
-    def __init__(self, logger: logging.Logger) -> None:
-        self._logger = logger
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self._logged: set[tuple[str, type[Exception]]] = set()
 
@@ -62,7 +62,7 @@ class LastingFailure:
             is_logged = kind in self._logged
             self._logged.add(kind)
         if not is_logged:
-            self._logger.warning("%s: %s", what, error)
+            logger.warning("%s: %s", what, error)
 
     def is_over(self) -> None:
         """Log that it works again if it had failed."""
@@ -70,4 +70,4 @@ class LastingFailure:
             failed = bool(self._logged)
             self._logged.clear()
         if failed:
-            self._logger.info("the store answers again")
+            logger.info("the store answers again")

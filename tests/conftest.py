@@ -22,9 +22,14 @@ from underskin.parallel import one_blas_thread
 # which took diagnoses two to five times their processor time. NumPy is not imported yet, here and in those processes.
 one_blas_thread()
 
-# A busy machine is slow and fails no test for it; the examples of a run are those of the next, but in a soak.
+# A busy machine is slow and fails no test for it; the examples of a run are those of the next, but in a soak, which
+# draws other ones, and four times as many.
 settings.register_profile(
-    "tests", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=not soak.SOAK
+    "tests",
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    derandomize=not soak.SOAK,
+    max_examples=100 if soak.SOAK else 25,
 )
 settings.load_profile("tests")
 

@@ -22,7 +22,6 @@ for function in (log_likelihoods, sigma_rows):
 """
 
 
-def test_set_up_compiled_loaded_not_compiled() -> None:
-    """What set up compiled is loaded and not compiled again."""
+def test_what_set_up_compiled_is_loaded_and_not_compiled_again() -> None:
     subprocess.run([sys.executable, "-m", "underskin.compiled"], check=True)
     subprocess.run([sys.executable, "-c", _LOADED], check=True)

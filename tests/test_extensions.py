@@ -99,17 +99,14 @@ def test_one_that_keeps_the_contract_is_taken() -> None:
         ({"parameters": lambda *_: None}, "parameters", "tuple"),
     ],
 )
-def test_field_breaks_contract_named(attributes: dict[str, Any], field: str, allowed: str) -> None:
-    """The field that breaks the contract is named."""
+def test_the_field_that_breaks_the_contract_is_named(attributes: dict[str, Any], field: str, allowed: str) -> None:
     with pytest.raises(InvalidInput) as refusal:
         check(changed(**attributes), built_in())
     assert refusal.value.field == field
     assert allowed in refusal.value.allowed
 
 
-def test_law_not_finite_bound_refused() -> None:
-    """A law that is not finite at a bound is refused there."""
-
+def test_a_law_that_is_not_finite_at_a_bound_is_refused_there() -> None:
     class Diverging(LowPass):
         parameters_stated = (Parameter("gap", "-", 0.0, 1.0, Uniform(), "linear", None, "a guess"),)
         parameters = Mechanism.parameters
@@ -123,8 +120,7 @@ def test_law_not_finite_bound_refused() -> None:
     assert refusal.value.field == "law (frf) at gap = 0 -"
 
 
-def test_second_spread_sensors_gains_refused() -> None:
-    """A second spread of the sensors gains is refused."""
+def test_a_second_spread_of_the_sensors_gains_is_refused() -> None:
     attributes: dict[str, Any] = {
         "stage": Stage.SENSOR,
         "act": Mechanism.act,
@@ -135,8 +131,7 @@ def test_second_spread_sensors_gains_refused() -> None:
         check(changed(**attributes), built_in())
 
 
-def test_page_lists_mechanism_state() -> None:
-    """The page lists all that a mechanism may state."""
+def test_the_page_lists_all_that_a_mechanism_may_state() -> None:
     page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
     traits = [name for name in vars(Mechanism)["__annotations__"] if not name.startswith("_")]
     for name in (*UNITS, *AXES, *READS, *Stage.__members__, *traits, *get_args(ActsOn), *get_args(Kind)):
@@ -161,8 +156,7 @@ class Other(Ageing):
 @pytest.mark.parametrize(
     "command", first(1, [["serve", "--port", "0"], ["diagnose", "examples/campaigns/2017-07.json"]])
 )
-def test_command_line_start_service_say_refused(command: list[str], tmp_path: Path) -> None:
-    """The command line and the start of the service say what is refused."""
+def test_the_command_line_and_the_start_of_the_service_say_what_is_refused(command: list[str], tmp_path: Path) -> None:
     folder = installed(tmp_path / "site", GROUP, "Other", TAKEN)
     if command[0] == "diagnose":
         command = [*command, "--output-dir", str(tmp_path / "reports")]
@@ -181,10 +175,9 @@ def test_command_line_start_service_say_refused(command: list[str], tmp_path: Pa
         ("", "the entry point lab_tools:Other", "AttributeError: module 'lab_tools' has no attribute 'Other'"),
     ],
 )
-def test_module_cannot_imported_refused(
+def test_a_module_that_cannot_be_imported_is_refused(
     source: str, field: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A module that cannot be imported is refused."""
     monkeypatch.syspath_prepend(installed(tmp_path, "underskin.test", "Other", source))
     monkeypatch.delitem(sys.modules, "lab_tools", raising=False)
     with pytest.raises(ExtensionError) as refusal:
@@ -194,8 +187,7 @@ def test_module_cannot_imported_refused(
     assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
 
 
-def test_without_packages_catalogue() -> None:
-    """Without other packages the catalogue is that of this one."""
+def test_without_other_packages_the_catalogue_is_that_of_this_one() -> None:
     assert tuple(CATALOGUE.values()) == built_in()
     assert CATALOGUE.packages == {}
 
@@ -230,8 +222,7 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-def test_package_composed_drawn_adopted_found(tmp_path: Path) -> None:
-    """One of another package is composed drawn adopted and found by worker processes."""
+def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_processes(tmp_path: Path) -> None:
     site = tmp_path / "site"
     shutil.copytree(EXAMPLE / "lab_skin", site / "lab_skin")
     (site / "lab_skin-1.0.dist-info").mkdir()

@@ -44,16 +44,14 @@ def format_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
         ("THING = FileFormat('lab', ('.lab',), 3)", "read", "function"),
     ],
 )
-def test_file_format_cannot_used_refused(source: str, field: str, reason: str, format_of: Any) -> None:
-    """A file format that cannot be used is refused."""
+def test_a_file_format_that_cannot_be_used_is_refused(source: str, field: str, reason: str, format_of: Any) -> None:
     with pytest.raises(ExtensionError, match=reason) as refusal:
         format_of(source)
     assert refusal.value.package == "lab-tools 2.1"
     assert refusal.value.field == field
 
 
-def test_file_read_format_suffix(format_of: Any) -> None:
-    """A file is read by the format of its suffix."""
+def test_a_file_is_read_by_the_format_of_its_suffix(format_of: Any) -> None:
     format_of(
         "THING = FileFormat('lab', ('.lab',), lambda stream, file: Contents((), {'said': stream.read().decode()}))"
     )
@@ -69,8 +67,7 @@ def test_file_read_format_suffix(format_of: Any) -> None:
     ("answer", "reason"),
     [("None", "must answer with Contents"), ("Contents((Block('1', (Channel('F', 'N', [1.0]),)),))", "one axis")],
 )
-def test_reader_package_answers_checked(answer: str, reason: str, format_of: Any) -> None:
-    """What a reader of another package answers is checked."""
+def test_what_a_reader_of_another_package_answers_is_checked(answer: str, reason: str, format_of: Any) -> None:
     format_of(f"THING = FileFormat('lab', ('.lab',), lambda stream, file: {answer})")
     with pytest.raises(FileError, match=reason):
         formats.parse("lab", io.BytesIO(b"x"), "a.lab")

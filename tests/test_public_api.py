@@ -52,8 +52,7 @@ def test_exports() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(PUBLIC))
-def test_export_comes_type_checker_believes(name: str) -> None:
-    """Export comes from where a type checker believes."""
+def test_export_comes_from_where_a_type_checker_believes(name: str) -> None:
     tree = ast.parse(Path(underskin.__file__).read_text(encoding="utf-8"))
     homes = {
         alias.name: node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for alias in node.names

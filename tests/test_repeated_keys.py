@@ -79,8 +79,7 @@ def test_its_line_and_column_are_told(text: str, key: str, line: int, column: in
     assert repeated_key(text.encode()) == (key, f"line {line}, column {column}")
 
 
-def test_every_route_takes_json_refuses_repeated(http: httpx.Client) -> None:
-    """Every route that takes json refuses a repeated key."""
+def test_every_route_that_takes_json_refuses_a_repeated_key(http: httpx.Client) -> None:
     paths = http.get("/openapi.json").json()["paths"]
     routes = [
         (method, path.replace("{", "").replace("}", ""))
@@ -125,8 +124,7 @@ def test_a_problem_says_what_comes_twice(http: httpx.Client) -> None:
 
 
 @pytest.mark.slow
-def test_command_line_names_file_line_column(tmp_path: Path) -> None:
-    """The command line names file line and column."""
+def test_the_command_line_names_file_line_and_column(tmp_path: Path) -> None:
     (tmp_path / "monday.json").write_text(TWICE)
     found = preloaded.run("d33", "monday.json", folder=tmp_path)
     assert found.returncode == 2

@@ -54,8 +54,7 @@ def test_rows_are_answered_alike(http: httpx.Client, command: str, columns: dict
     assert {name: told[name] for name in by_server} == by_server
 
 
-def test_result_not_finite_outside(http: httpx.Client) -> None:
-    """A result that is not finite is outside for both."""
+def test_a_result_that_is_not_finite_is_outside_for_both(http: httpx.Client) -> None:
     columns = {**D33, "frf_pc_per_n": [7.0, 1e308], "sensor_radius_mm": 0.05}
     answer = http.post("/v1/d33", json={**columns, "units_checked": True})
     assert answer.status_code == 200, answer.text

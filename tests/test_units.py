@@ -44,16 +44,14 @@ def test_impossible_values_are_refused_by_name(field: str, value: float) -> None
         ("sensor_radius_mm", 1500.0, "1.5 mm: was it given in µm"),
     ],
 )
-def test_unlikely_magnitudes_refused_guess(field: str, value: float, guess: str) -> None:
-    """Unlikely magnitudes are refused with a guess."""
+def test_unlikely_magnitudes_are_refused_with_a_guess(field: str, value: float, guess: str) -> None:
     with pytest.raises(InvalidInput, match=guess) as refusal:
         Skin.from_lab(**{**GOOD, field: value})
     assert refusal.value.index is None
     assert Skin.from_lab(**{**GOOD, field: value}, units_checked=True).thickness > 0
 
 
-def test_override_not_open_door_impossible() -> None:
-    """The override does not open the door to impossible values."""
+def test_the_override_does_not_open_the_door_to_impossible_values() -> None:
     with pytest.raises(InvalidInput):
         Indenter.from_lab(indenter_radius_mm=-4.0, units_checked=True)
 
@@ -73,8 +71,7 @@ def test_poisson_ratio_is_bounded() -> None:
     assert Skin.from_lab(**GOOD, poisson_ratio=np.array([0.3, 0.5])).poisson_ratio.shape == (2,)
 
 
-def test_measured_magnitudes_findings_not_errors() -> None:
-    """Measured magnitudes are findings not errors."""
+def test_measured_magnitudes_are_findings_not_errors() -> None:
     assert unusual("frf_pc_per_n", [7.4, -7.4]) == []
     found = unusual("frf_pc_per_n", [7.4, 7.4e-12, 7e-12])
     assert [(finding.field, finding.index) for finding in found] == [("frf_pc_per_n", 1)]

@@ -1,6 +1,5 @@
 """Access control: allowed Host and Origin headers, API key where one is required, body size within the limit."""
 
-import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,9 +9,8 @@ from service.auth import session
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import Key, KeyStore, KeysUnreadable
 from service.auth.sessions import Sessions
+from service.log import logger
 from service.problems import RETRY_LATER, Refusal, is_browsing
-
-logger = logging.getLogger("underskin")
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 OPEN = frozenset({"/health", "/ready"})

@@ -1,15 +1,10 @@
 """Whether requests need a key: from the first key on, whatever becomes of keys.json, until `underskin key open`."""
 
-import logging
 import threading
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from service.auth.keys import KeyStore
-from service.log import LastingFailure
-from service.store import Database, StorageFailed, StoreMoved, key_requirement
-
-logger = logging.getLogger("underskin")
+from service.log import LastingFailure, logger
+from service.store import STORE_FAILED, Database, key_requirement
 
 _LOOK_S = 0.5  # how often: revoking and opening take effect within a second
 _JOIN_S = 10.0
@@ -28,7 +23,7 @@ class KeyRequirement:
         self._keys = keys
         self._store = store
         self._missing = 0  # looks in a row
-        self._failure = LastingFailure(logger)
+        self._failure = LastingFailure()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="key requirement", daemon=True)
 
@@ -66,7 +61,7 @@ class KeyRequirement:
                 self._warn_of_missing_keys()
                 self._store.require_in_place()  # connections that are open read on where the file was moved
                 self._failure.is_over()
-            except (SQLAlchemyError, StorageFailed, StoreMoved, OSError) as error:
+            except STORE_FAILED as error:
                 self._failure.log("whether keys are needed cannot be looked up", error)
 
     def _warn_of_missing_keys(self) -> None:

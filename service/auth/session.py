@@ -13,6 +13,8 @@ import time
 from collections.abc import Mapping
 from hashlib import sha256
 
+from starlette.requests import Request
+
 from service.auth.keys import Key, KeyStore
 
 COOKIE = "underskin_session"
@@ -72,6 +74,11 @@ def cookie_in(headers: Mapping[bytes, bytes]) -> str:
         if name == COOKIE:
             return value
     return ""
+
+
+def cookie_of(request: Request) -> str:
+    """The same of a request as routes have it."""
+    return cookie_in(dict(request.scope["headers"]))
 
 
 def _signature(key: Key, body: str) -> str:

@@ -1,25 +1,19 @@
 """Open sessions in the store: each login is recorded, and ending a session ends it on every server."""
 
-import logging
 import threading
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from datetime import UTC, datetime
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from service.auth import session
 from service.auth.keys import Key
 from service.log import LastingFailure
-from service.store import AnyRow, Database, Missing, StorageFailed, StoreMoved, sessions
+from service.store import STORE_FAILED, AnyRow, Database, Missing, sessions
 from service.store.times import stored
-
-logger = logging.getLogger("underskin")
 
 _LOOK_S = 0.5  # how often: an ended session is refused within a second
 _JOIN_S = 10.0
 _LONGEST_BROWSER = 200
-_STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
 class Sessions:
@@ -33,7 +27,7 @@ class Sessions:
         self._store = store
         self._ended: frozenset[str] = frozenset()
         self._adding = threading.Lock()
-        self._failure = LastingFailure(logger)
+        self._failure = LastingFailure()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="sessions", daemon=True)
 
@@ -50,7 +44,7 @@ class Sessions:
         noted = sessions.NewSession(session.id_of(cookie), key.name, key.sha256, address, shown, expires_at)
         try:
             self._store.write(sessions.add, noted)
-        except _STORE_FAILED as error:  # on a full disk stored data can still be read, also by those who log in now
+        except STORE_FAILED as error:  # on a full disk stored data can still be read, also by those who log in now
             self._failure.log("a login cannot be noted: the session ends with its key, or when it expires", error)
         return cookie
 
@@ -70,7 +64,7 @@ class Sessions:
             self._store.write(sessions.end, session.id_of(cookie), key.sha256)
         except Missing:
             pass  # it began before sessions were noted
-        except _STORE_FAILED as error:
+        except STORE_FAILED as error:
             self._failure.log("a logout cannot be kept: the session ends on this server alone", error)
 
     def look(self) -> None:
@@ -98,5 +92,5 @@ class Sessions:
                 self.look()
                 self._store.require_in_place()  # connections that are open read on where the file was moved
                 self._failure.is_over()
-            except _STORE_FAILED as error:
+            except STORE_FAILED as error:
                 self._failure.log("which sessions were ended cannot be looked up", error)

@@ -12,7 +12,7 @@ from service.log import first_line
 from service.settings import make_data_folder
 from service.store import Database, StorageFailed, database, key_requirement, migrate
 from service.store import backup as backups
-from service.usecases import mechanism_files
+from service.usecases import mechanisms
 from underskin import UnderskinError
 from underskin.cli.store import byte_steps
 from underskin.mechanisms.declared.document import FOLDER
@@ -52,7 +52,7 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
         raise UnderskinError(first_line(error)) from error
     typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))
     try:
-        _report_mechanisms(store.read(mechanism_files.put_back))
+        _report_mechanisms(store.read(mechanisms.put_back_files))
     except OSError as error:
         raise UnderskinError(f"the store is restored, but the mechanisms of the lab's own are not: {error}") from error
     if needed:
@@ -62,12 +62,12 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
 def _remember_mechanisms(store: Database) -> None:
     """A disk that takes nothing keeps nobody from a backup elsewhere."""
     try:
-        store.write(mechanism_files.remember)
+        store.write(mechanisms.remember_files)
     except StorageFailed as error:
         typer.echo(f"mechanisms of the lab's own are in the backup as they were at the last one: {error}", err=True)
 
 
-def _report_mechanisms(outcome: mechanism_files.PutBack) -> None:
+def _report_mechanisms(outcome: mechanisms.PutBack) -> None:
     for names, became in (
         (outcome.written, "put back"),
         (outcome.replaced, "put back; what the folder has in their place is set aside in discarded"),

@@ -7,39 +7,13 @@ import typer
 
 from service.cli.shared import read_settings, use_folder_of_lab
 from service.jobs.process import CampaignInput, WorkerProcesses
+from service.jobs.worker import FEW_NUMBERS
 from service.settings import Settings
-from service.usecases.checkup import examine
-from service.usecases.observation import Level, Observation
+from service.usecases.checkup import Level, Observation, examine
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 _LIMIT_S = 120.0
 _MARKS = {Level.OK: "ok", Level.WARNING: "warning", Level.CRITICAL: "CRITICAL"}
-
-# Enough to be diagnosed, not enough to say anything: it is the worker that is tried.
-_TRIAL = {
-    "schema": "campaign/1",
-    "name": "trial",
-    "skin": {
-        "poisson_ratio": 0.5,
-        "thickness_mm": 2.5,
-        "youngs_modulus_mpa": 16.0,
-        "sensor_radius_mm": 1.5,
-        "sensors": [{"id": "s1", "x_mm": 0.0, "y_mm": 0.0}],
-    },
-    "recordings": [
-        {
-            "id": f"r{number}",
-            "sensor": "s1",
-            "indenter_radius_mm": 4.0,
-            "preload_n": preload,
-            "dynamic_force_n": 0.09,
-            "frequency_hz": [10.0, 20.0, 50.0],
-            "frf_re_pc_per_n": [7.4, 7.41, 7.39],
-            "frf_im_pc_per_n": [0.0, 0.01, -0.01],
-        }
-        for number, preload in enumerate((0.5, 1.0, 2.0, 3.0))
-    ],
-}
 
 
 def doctor(
@@ -88,7 +62,7 @@ def _of_workers(settings: Settings, *, has_tables: bool) -> Observation:
             settings.diagnosis_seconds,
             keeps_ready=False,
         )
-        with processes.at_work([CampaignInput(json.dumps(_TRIAL).encode(), "trial")]) as worker:
+        with processes.at_work([CampaignInput(json.dumps(FEW_NUMBERS).encode(), "trial")]) as worker:
             while not worker.ended and worker.news.wait(_LIMIT_S):
                 worker.news.clear()
             failure = "" if "report" in worker.messages else worker.failure if worker.ended else "it did not end"

@@ -3,7 +3,6 @@
 import errno
 import gc
 import ipaddress
-import logging
 import socket
 import tempfile
 from pathlib import Path
@@ -18,9 +17,8 @@ from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
 from service.auth.sessions import Sessions
 from service.cli.shared import STORE_ERRORS, fail, read_settings, use_folder_of_lab
-from service.log import configure_logging
-from service.middleware.connection_limits import ConnectionLimits
-from service.middleware.http_protocol import limited
+from service.log import configure_logging, logger
+from service.middleware.http_protocol import ConnectionLimits, limited
 from service.settings import make_data_folder, unknown_settings
 from service.store import open_store
 from underskin import ExtensionError, TableError
@@ -28,8 +26,6 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.readers.formats import formats_of_other_packages
 from underskin.recordings.readers.parsing_limits import ParsingLimits
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
-
-logger = logging.getLogger("underskin")
 
 _COLLECTIONS = 50_000, 20, 100  # a whole one after some 10^8 objects more than were freed
 

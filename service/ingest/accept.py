@@ -1,19 +1,21 @@
 """Stores the campaigns of uploads in one transaction; a repeated request gets the earlier answer."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import orjson
+from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from service.ingest import instruments, repeats
-from service.ingest.held_arrays import HeldArrays
 from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, look, require_few
 from service.ingest.rig_words import rig_sentences
 from service.ingest.uploads import Upload
 from service.problems import Refusal
+from service.settings import Settings
 from service.store import Database, answers, campaigns, instrument_templates, skins
 from underskin.errors import FileError, InvalidInput, SeveralInvalid, conflicting, errors_of, required
 from underskin.findings.formatting import grouped_by_reason, recordings_called, why_refused
@@ -28,19 +30,52 @@ _MOST_ERRORS = 100  # in the problem of a request of which nothing is stored
 _MOST_LISTED_ERRORS = 3  # of them in its sentence
 
 
+class HeldArrays:
+    """Total size of the arrays of the campaigns read so far; at most `most_bytes`."""
+
+    def __init__(self, most_bytes: int) -> None:
+        """Nothing was read yet."""
+        self._most_bytes = most_bytes
+        self._bytes = 0
+        self._counted: set[int] = set()  # arrays that own their numbers: recordings may share one, or parts of it
+
+    def add(self, campaigns: Iterable[ReadCampaign]) -> None:
+        """Add the arrays of a campaign; raises Refusal (413) beyond the limit."""
+        for array in _arrays(campaigns):
+            owner = array
+            while isinstance(owner.base, np.ndarray):
+                owner = owner.base
+            if id(owner) not in self._counted:
+                self._counted.add(id(owner))
+                self._bytes += owner.nbytes
+        if self._bytes > self._most_bytes:
+            raise Refusal(
+                413,
+                f"Unfolded, the files have more than the {self._most_bytes / 1e6:g} MB that one request may bring: "
+                "four times UNDERSKIN_MAX_UPLOAD_MB, or UNDERSKIN_READING_MEMORY_MB where that is more. Send them in "
+                "several requests, or raise UNDERSKIN_MAX_UPLOAD_MB. Nothing was kept.",
+            )
+
+
+def _arrays(campaigns: Iterable[ReadCampaign]) -> Iterator[NDArray[np.generic]]:
+    for campaign in campaigns:
+        if campaign.reading is not None:
+            for recording in campaign.reading.campaign.recordings:
+                yield from (value for value in vars(recording).values() if isinstance(value, np.ndarray))
+
+
 @dataclass(frozen=True)
 class IngestOptions:
     """Options of an upload request."""
 
-    skin: str | None
-    corrects: str | None
-    reason: str | None
-    all_or_nothing: bool
-    together: str | None
-    idempotency_key: str | None
+    settings: Settings
     sender: str | None
-    most_json_bytes: int
-    most_unfolded_bytes: int
+    skin: str | None = None
+    corrects: str | None = None
+    reason: str | None = None
+    all_or_nothing: bool = False
+    together: str | None = None
+    idempotency_key: str | None = None
     estimator: Estimator | None = None
     turn_curves: bool = False  # that count pressing negative
     use_stored_rig: bool = True  # whether the stored rig description of the skin is used if none is sent
@@ -128,10 +163,10 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
     """The campaigns of all files; a single one if the files belong together."""
     files: list[ReadCampaign] = []
     recordings = 0
-    held = HeldArrays(options.most_unfolded_bytes)
+    held = HeldArrays(options.settings.max_unfolded_bytes)
     for upload in uploads:
         if upload.field != RIG:
-            more = look(upload, rig, options.most_json_bytes, uploads).campaigns
+            more = look(upload, rig, options.settings.max_body_bytes, uploads).campaigns
             more = [file.with_curves_turned() for file in more] if options.turn_curves else more
             files += [file.with_estimator(options.estimator) for file in more]
             held.add(more)

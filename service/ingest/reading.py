@@ -12,8 +12,8 @@ import orjson
 from service.ingest import instruments
 from service.ingest.rig_words import template_sentence
 from service.ingest.uploads import Upload
-from service.middleware import long_json
-from service.middleware.unique_keys import require_unique_keys
+from service.middleware import json_bodies
+from service.middleware.json_bodies import require_unique_keys
 from service.problems import Refusal
 from service.store import Database, skins
 from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement
@@ -212,8 +212,8 @@ def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
         limit = f"{most_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
         raise Refusal(413, f"JSON may have up to {limit}; send more in several requests, or as HDF5.")
     try:
-        document = _long_document(upload) if size > long_json.LONG_BYTES else _document(upload)
-    except long_json.NotJson as wrong:
+        document = _long_document(upload) if size > json_bodies.LONG_BYTES else _document(upload)
+    except json_bodies.NotJson as wrong:
         if not upload.in_form:
             raise Refusal(400, f"The body is not JSON: {wrong}.") from None
         unreadable = field_error("file", upload.label, f"must be JSON; {wrong}", ErrorCode.UNREADABLE_FILE)
@@ -235,14 +235,14 @@ def _document(upload: Upload) -> Any:
     try:
         document = orjson.loads(content)
     except orjson.JSONDecodeError as error:
-        raise long_json.NotJson(f"line {error.lineno}, column {error.colno}: {error.msg}") from None
+        raise json_bodies.NotJson(f"line {error.lineno}, column {error.colno}: {error.msg}") from None
     require_unique_keys(content)
     return document
 
 
 def _long_document(upload: Upload) -> Any:
     with upload.path.open("rb") as stream:
-        return long_json.read(stream)
+        return json_bodies.read(stream)
 
 
 def _recordings_in(document: Any) -> int:

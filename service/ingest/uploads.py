@@ -1,35 +1,151 @@
 """Uploads, streamed into files under names of our own; the limits are enforced while data arrive.
 
-A file's own name is stored as a label. It is never used as a path, and does not determine the file's type.
+A file's own name is stored as a label. It is never used as a path, and does not determine the file's type. Files are
+written outside the event loop, one megabyte at a time: a slow or hanging disk delays only uploads, which have their own
+threads.
 """
 
 import fcntl
+import hashlib
 import math
 import shutil
 import tempfile
-from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import AsyncIterator, Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, Self, TypeVar
 
+from anyio import CancelScope, CapacityLimiter, to_thread
 from fastapi import Request
 from python_multipart import MultipartParser
 from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import parse_options_header
 
-from service.ingest.arriving_files import ArrivingFile, ArrivingFiles, DiskThreads
-from service.problems import Refusal
+from service.problems import Refusal, invalid_input, unknown_name
 from service.store import StoreMoved
 from service.store.engine import storage_failure
+from underskin.errors import InvalidInput, not_unique, wrong_type
 
 if TYPE_CHECKING:
     from python_multipart.multipart import MultipartCallbacks
 
+_AT_ONCE_BYTES = 1 << 20  # that are written in one go: a thread for each chunk of a body would cost more than it writes
+_THREADS = 8
+_Result = TypeVar("_Result")
 FOLDER = "uploads"  # in the data folder: on the disk that the store is on
 _MOST_PARTS = 1000
 _LONGEST_HEADER = 4096
 _LONGEST_LABEL = 200
+FILE = "file"  # a part of this name is a file, also where its sender gives no file name
+_LONGEST_TEXT = 4096  # bytes
+
+
+class DiskThreads:
+    """A small thread pool for writing uploads, separate from the threads that answer other requests."""
+
+    def __init__(self) -> None:
+        """Within the event loop."""
+        self._limiter = CapacityLimiter(_THREADS)
+
+    async def run(self, work: Callable[[], _Result]) -> _Result:
+        """The result of `work`, or its exception."""
+        return await to_thread.run_sync(work, limiter=self._limiter)
+
+
+class ArrivingFile:
+    """A file being received; data are buffered until written."""
+
+    def __init__(self, path: Path) -> None:
+        """Empty; the file is created at the first write."""
+        self.path = path
+        self.held = bytearray()
+        self.ended = False
+        self._file: BinaryIO | None = None
+        self._digest = hashlib.sha256()
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 digest of the written data."""
+        return self._digest.hexdigest()
+
+    def write(self) -> None:
+        """Write the buffer, and close the file if it is complete."""
+        if self._file is None:
+            self._file = self.path.open("xb")
+        self._file.write(self.held)
+        self._digest.update(self.held)
+        self.held = bytearray()
+        if self.ended:
+            self._file.close()
+
+    def close(self) -> None:
+        """Discard the file if it is incomplete."""
+        if self._file is not None:
+            self._file.close()
+
+
+class ArrivingFiles:
+    """The files of a request, one after the other, in a folder of their own."""
+
+    def __init__(self, folder: Path, threads: DiskThreads) -> None:
+        """An empty folder."""
+        self._folder = folder
+        self._threads = threads
+        self._count = 0
+        self._unwritten: list[ArrivingFile] = []  # the last of them is the one that comes
+        self._held_bytes = 0
+
+    @classmethod
+    @asynccontextmanager
+    async def below(cls, parent: Path, threads: DiskThreads) -> AsyncIterator[Self]:
+        """In a new folder, removed at the end of the block."""
+        folder = await threads.run(partial(tempfile.TemporaryDirectory, dir=parent))
+        files = cls(Path(folder.name), threads)
+
+        def remove() -> None:
+            for file in files._unwritten:
+                file.close()
+            folder.cleanup()
+
+        try:
+            yield files
+        finally:
+            with CancelScope(shield=True):
+                await threads.run(remove)
+
+    def begin(self) -> ArrivingFile:
+        """Start the next file."""
+        file = ArrivingFile(self._folder / str(self._count))
+        self._count += 1
+        self._unwritten.append(file)
+        return file
+
+    def take(self, data: bytes | memoryview) -> None:
+        """Append data to the current file."""
+        self._unwritten[-1].held += data
+        self._held_bytes += len(data)
+
+    def end(self) -> None:
+        """The current file is complete."""
+        self._unwritten[-1].ended = True
+
+    async def write_much(self) -> None:
+        """Write the buffers if they are large."""
+        if self._held_bytes >= _AT_ONCE_BYTES:
+            await self.write()
+
+    async def write(self) -> None:
+        """Write the buffers."""
+        await self._threads.run(self._write)
+
+    def _write(self) -> None:
+        for file in self._unwritten:
+            file.write()
+        self._unwritten = [file for file in self._unwritten if not file.ended]
+        self._held_bytes = 0
 
 
 @dataclass(frozen=True)
@@ -231,3 +347,50 @@ def _text(value: bytes | None) -> str | None:
         return None
     text = "".join(letter for letter in value.decode("utf-8", "replace") if letter.isprintable())
     return text[:_LONGEST_LABEL]
+
+
+def split(
+    uploads: Sequence[Upload], texts: Collection[str] = (), single_files: Collection[str] = ()
+) -> tuple[dict[str, str], list[Upload]]:
+    """The values of the text fields `texts`, and all other parts, which are files; a body that is not a form is one
+    file.
+
+    A part with a file name is a file, whatever its field name; a field of `single_files` may come once. Raises Refusal
+    (422) naming each field that is unknown, given twice, or a file in place of a text.
+    """
+    form = [upload for upload in uploads if upload.in_form]
+    errors = [error for upload in form for error in _errors(upload, texts, single_files)]
+    count = Counter(upload.field for upload in form)
+    once = (*texts, *single_files)
+    errors += [not_unique(name, f"{count[name]} parts") for name in once if count[name] > 1]
+    if errors:
+        raise invalid_input(errors)
+    values = {str(upload.field): upload.path.read_bytes().decode() for upload in form if upload.field in texts}
+    return values, [upload for upload in uploads if upload.field not in texts]
+
+
+def _errors(upload: Upload, texts: Collection[str], single_files: Collection[str]) -> Iterator[InvalidInput]:
+    """Errors of one part of a form."""
+    name = upload.field or ""
+    names = (*texts, FILE, *single_files)
+    if upload.label is None and name not in names:
+        yield unknown_name(name, _start_of(upload), names, "form field")
+    elif name in texts and upload.label is not None:
+        yield wrong_type(name, upload.label, "must be a text, not a file")
+    elif name in texts and not _is_short_text(upload):
+        yield wrong_type(name, _start_of(upload), f"must be text in UTF-8 of at most {_LONGEST_TEXT} bytes")
+
+
+def _is_short_text(upload: Upload) -> bool:
+    if upload.path.stat().st_size > _LONGEST_TEXT:
+        return False
+    try:
+        upload.path.read_bytes().decode()
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _start_of(upload: Upload) -> str:
+    """The start of a text, as long as an error message shows."""
+    return upload.start(100).decode("utf-8", "replace")

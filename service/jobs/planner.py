@@ -8,15 +8,13 @@ import time
 from collections import OrderedDict
 from dataclasses import asdict, dataclass
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from service.jobs.process import CampaignInput, WorkerProcesses
-from service.jobs.runner import logger
+from service.log import logger
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
-
-if TYPE_CHECKING:
-    from underskin.diagnosis.planning.rig_limits import RigLimits
+from underskin.diagnosis.planning.rig_limits import RigLimits
 
 _REMEMBERED = 50
 _MOST_WAITING = 8
@@ -53,7 +51,7 @@ class Planner:
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._work, name="planning", daemon=True)
 
-    def plan(self, row: AnyRow, limits: "RigLimits") -> Planned:
+    def plan(self, row: AnyRow, limits: RigLimits) -> Planned:
         """The plan of a diagnosis within these limits; computed if it is not cached, or failed over a minute ago.
         Raises Refusal 503 if too many are waiting, or if this server runs no diagnoses."""
         key = (str(row.id), repr(limits))
@@ -92,7 +90,7 @@ class Planner:
                 logger.exception("a plan could not be made", extra={"fields": {"diagnosis": row.id}})
                 planned.fail(f"{type(error).__name__}: {error}")
 
-    def _run(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
+    def _run(self, row: AnyRow, limits: RigLimits, planned: Planned) -> None:
         planned.state = "running"
         campaign, _ = self._store.read(diagnoses.campaign_of, row)
         without = diagnoses.without(row)

@@ -1,6 +1,5 @@
 """Claims diagnoses from the store's queue and runs each in a worker process, as many at once as there are cores."""
 
-import logging
 import secrets
 import threading
 import time
@@ -8,23 +7,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from service.jobs.process import CampaignInput, Worker, WorkerProcesses
-from service.log import LastingFailure
-from service.store import AnyRow, Database, StorageFailed, StoreMoved, diagnoses
+from service.log import LastingFailure, logger
+from service.store import STORE_FAILED, AnyRow, Database, StoreMoved, diagnoses
 from underskin import __version__
 from underskin.mechanisms.declared.document import digest
 from underskin.recordings.validation import LONGEST_NAME
-
-logger = logging.getLogger("underskin")
 
 _POLL_S = 2.0  # how often the queue is looked at: another server may have put something in
 _BEAT_S = 2.0  # interval of heartbeats and of stored progress
 _JOIN_S = 10.0
 _LONG_S = 30.0  # from which on a diagnosis that runs holds up others no more
 _SHORT_S = 60.0  # within which a diagnosis must end that runs in addition to as many long ones as there are workers
-_STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
 def basis(table_sha256: str) -> diagnoses.Basis:
@@ -66,7 +60,7 @@ class Runner:
         self._jobs: dict[int, _Job] = {}  # by the diagnosis' number
         self._long: set[int] = set()  # those that had to go back into the queue
         self._lock = threading.Lock()
-        self._failure = LastingFailure(logger)
+        self._failure = LastingFailure()
         self._dispatcher = threading.Thread(target=self._dispatch, name="diagnosing", daemon=True)
 
     def start(self) -> None:
@@ -100,7 +94,7 @@ class Runner:
             try:
                 while self._claim():
                     pass
-            except _STORE_FAILED as error:
+            except STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
             # Not while one starts: it may hold for minutes the lock for which this would wait.
             if not self._stirred.wait(_POLL_S) and not self._starting():
@@ -198,7 +192,7 @@ class Runner:
         """Renew the claim; False if it was cancelled or another server claimed it, True if the store fails."""
         try:
             ours = self._store.write(diagnoses.keep_alive, row.number, self._server, progress)
-        except _STORE_FAILED as error:
+        except STORE_FAILED as error:
             self._failure.log("a diagnosis cannot be kept alive", error)
             return True
         self._failure.is_over()
@@ -210,7 +204,7 @@ class Runner:
             try:
                 self._store.write(change, row.number, self._server, *outcome)
                 return
-            except _STORE_FAILED as error:
+            except STORE_FAILED as error:
                 self._failure.log("what came of a diagnosis cannot be kept", error)
                 if self._ending.wait(_POLL_S):
                     return
@@ -218,5 +212,5 @@ class Runner:
     def _release(self, row: AnyRow) -> None:
         try:
             self._store.write(diagnoses.release, row.number, self._server)
-        except _STORE_FAILED as error:
+        except STORE_FAILED as error:
             self._failure.log("a diagnosis cannot be put back into the queue", error)

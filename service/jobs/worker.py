@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 SendMessage = Callable[[dict[str, Any]], None]
 
-_FEW_NUMBERS: dict[str, Any] = {
+# A campaign that can be diagnosed, of which nothing can be concluded.
+FEW_NUMBERS: dict[str, Any] = {
     "schema": "campaign/1",
     "name": "a few numbers",
     "skin": {
@@ -128,7 +129,7 @@ def warm_up(table: "SigmaTable") -> None:
     from underskin.diagnosis.reporting.report import report
     from underskin.recordings.campaign import parse
 
-    diagnosis = diagnose(parse(_FEW_NUMBERS), table)
+    diagnosis = diagnose(parse(FEW_NUMBERS), table)
     for figure in figures(diagnosis, report(diagnosis)).values():
         figure.to_json()
 

@@ -6,34 +6,59 @@ path, which defines what is valid and the errors.
 """
 
 import itertools
-import logging
 import os
 import re
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth.access_control import OPEN, AccessControl, goes_to_disk
-from service.log import KEY
+from service.log import KEY, logger
 from service.middleware.error_handlers import ProblemPage, problem_response
-from service.middleware.held_bodies import HeldBodies
 from service.middleware.http_protocol import OVERLOADED
 from service.middleware.request_log import Answered, record
 from service.problems import RETRY_LATER, Refusal, unexpected
 
-logger = logging.getLogger("underskin")
-
+_SHORT_BYTES = 1_000_000  # of each body that are not counted
 WITHOUT_CONTENT = "without_content"  # in the scope of a request (HEAD) of whose answer only the headers are sent
 _NUMBERS = frozenset({int, float})
 _LONGEST_HELD = 8  # bodies as large as they may be that are held at once
 _MOST_HOT_BYTES = 10_000  # of a body that a hot route looks at, on the event loop
 _SANE_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
-
 # Answers a query string (GET) or a body (POST) with JSON, or with None to leave it to the API.
 HotRoute = Callable[[bytes], bytes | None]
+
+
+class HeldBodies:
+    """Total bytes of the bodies held in memory; uploads go to disk and do not count."""
+
+    def __init__(self, most_bytes: int) -> None:
+        """None yet."""
+        self._most_bytes = most_bytes
+        self._bytes = 0
+
+    @contextmanager
+    def one(self) -> Iterator[Callable[[int], None]]:
+        """Context of one request: a function to be called with the number of bytes received so far. It raises
+        Refusal 503 if there is no room for them."""
+        counted = 0
+
+        def hold(size: int) -> None:
+            nonlocal counted
+            self._bytes -= counted
+            counted = max(0, size - _SHORT_BYTES)
+            self._bytes += counted
+            if counted and self._bytes > self._most_bytes:
+                raise Refusal(503, "Other large bodies are under way; try again in a while.", headers=RETRY_LATER)
+
+        try:
+            yield hold
+        finally:
+            self._bytes -= counted
 
 
 def are_numbers(values: Iterable[object]) -> bool:

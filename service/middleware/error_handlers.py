@@ -1,6 +1,5 @@
 """Turns every exception of a route into a problem document."""
 
-import logging
 from collections.abc import Callable, Sequence
 
 from fastapi import FastAPI, Request, Response
@@ -11,6 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import Scope
 
+from service.log import logger
 from service.problems import (
     RETRY_LATER,
     Refusal,
@@ -22,11 +22,8 @@ from service.problems import (
 from service.store import Conflict, Missing, StorageFailed, StorageFull, StoreMoved
 from service.store.answers import OtherRequest
 from service.store.engine import storage_failure
-from underskin import InvalidInput
+from underskin import InvalidInput, TableError
 from underskin.errors import SeveralInvalid
-
-logger = logging.getLogger("underskin")
-
 
 _STATUS = {Missing: 404, Conflict: 409, OtherRequest: 422}
 
@@ -42,7 +39,7 @@ def install_handlers(api: FastAPI, problem_page: ProblemPage, methods: Methods) 
         request.scope["why"] = refusal.in_log()
         return problem_response(request.scope, refusal, problem_page)
 
-    ours = (Refusal, InvalidInput, RequestValidationError, HTTPException)
+    ours = (Refusal, InvalidInput, TableError, RequestValidationError, HTTPException)
     for kind in (*ours, *_STATUS, StorageFailed, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
         api.add_exception_handler(kind, handle)
 
@@ -90,7 +87,7 @@ def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal
 
 
 def _of_the_store(request: Request, error: Exception) -> Refusal:
-    """The problem of the store's exceptions and of unexpected ones."""
+    """The problem of exceptions of the store and of tables, and of unexpected ones."""
     match error:
         case Missing() | Conflict() | OtherRequest():
             return Refusal(_STATUS[type(error)], str(error))
@@ -101,6 +98,8 @@ def _of_the_store(request: Request, error: Exception) -> Refusal:
             return Refusal(507, f"The disk takes nothing ({error}): nothing of this request was kept.")
         case StoreMoved():
             return Refusal(503, str(error), headers=RETRY_LATER)
+        case TableError():
+            return Refusal(503, str(error))
         case DataError():
             return Refusal(422, "A text has a character that cannot be kept, such as NUL.")
         case IntegrityError():

@@ -4,16 +4,16 @@ from functools import partial
 from typing import Annotated, Any, Literal
 
 import orjson
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import StreamingResponse
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import WRITE, CampaignId, Store, Table, number_of_cursor, sender
+from service.dependencies import CampaignId, Cursor, Limit, Store, Table, number_of_cursor, sender
 from service.ingest.accept import RIG, IngestOptions, accept
-from service.ingest.form_fields import FILE, split
 from service.ingest.reading import keeping
-from service.ingest.uploads import received
-from service.middleware.unique_keys import JsonRoute
+from service.ingest.uploads import FILE, received, split
+from service.middleware.json_bodies import JsonRoute
+from service.routes.idempotency import IdempotencyKey
 from service.routes.temporary_files import made_file
 from service.schemas import campaigns as models
 from service.schemas.campaign_d33 import D33
@@ -94,26 +94,17 @@ _BODY: dict[str, Any] = {
 
 @router.post(
     "/campaigns",
-    operation_id="post_campaigns",
     summary="Send campaigns",
     status_code=201,
-    dependencies=WRITE,
     openapi_extra=_BODY,
     responses={201: {"model": models.CampaignResult | models.BatchResult}},
 )
-async def post(
+async def post_campaigns(
     request: Request,
     store: Store,
     table: Table,
     query: Annotated[models.SendOptions, Query()],
-    idempotency_key: Annotated[
-        str | None,
-        Header(
-            min_length=1,
-            max_length=255,
-            description="A text of your own: the same request under the same key is answered the same and kept once.",
-        ),
-    ] = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Keeps the good recordings and says of each of the others what was wrong. What is answered is on the disk.
 
@@ -124,11 +115,7 @@ async def post(
     async with received(request, folder) as parts, keeping(store):
         fields, uploads = await folder.threads.run(partial(split, parts, list(models.SendOptions.model_fields), [RIG]))
         options = IngestOptions(
-            **query.with_form(fields).model_dump(),
-            idempotency_key=idempotency_key,
-            sender=sender(request),
-            most_json_bytes=settings.max_body_bytes,
-            most_unfolded_bytes=settings.max_unfolded_bytes,
+            settings, sender(request), idempotency_key=idempotency_key, **query.with_form(fields).model_dump()
         )
         answer, repeats = await run_in_threadpool(accept, store, uploads, options)
         campaign_ids = [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]
@@ -145,8 +132,8 @@ def listed(
     name_contains: Annotated[str | None, Query(description="Only those whose name contains this.")] = None,
     recorded_from: Annotated[str | None, Query(description="Only those recorded at this time or later.")] = None,
     recorded_to: Annotated[str | None, Query(description="Only those recorded before this time.")] = None,
-    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
-    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
 ) -> models.CampaignList:
     """Without their recordings; a page holds `limit` of them."""
     filters = campaigns.CampaignFilters(
@@ -161,15 +148,14 @@ def listed(
     return models.CampaignList(campaigns=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
 
-@router.get("/campaigns/{campaign_id}", operation_id="campaign", summary="One campaign")
-def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
+@router.get("/campaigns/{campaign_id}", summary="One campaign")
+def campaign(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
     """With its recordings, without their arrays."""
     return store.read(usecase.detail, campaign_id)
 
 
 @router.get(
     "/campaigns/{campaign_id}/document",
-    operation_id="campaign_document",
     summary="One campaign as campaign/1",
     response_class=Response,
     responses={
@@ -181,7 +167,7 @@ def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
         }
     },
 )
-def document(
+def campaign_document(
     campaign_id: CampaignId,
     request: Request,
     store: Store,
@@ -199,8 +185,8 @@ def document(
     )
 
 
-@router.get("/campaigns/{campaign_id}/d33", operation_id="campaign_d33", summary="d33 of each sensor")
-def d33(
+@router.get("/campaigns/{campaign_id}/d33", summary="d33 of each sensor")
+def campaign_d33(
     campaign_id: CampaignId,
     store: Store,
     table: Table,
@@ -220,10 +206,8 @@ def d33(
     return D33(**d33_cache.by_model(store, table, row, model, band))
 
 
-@router.post(
-    "/campaigns/{campaign_id}/withdraw", operation_id="withdraw_campaign", summary="Withdraw it", dependencies=WRITE
-)
-def withdraw(
+@router.post("/campaigns/{campaign_id}/withdraw", summary="Withdraw it")
+def withdraw_campaign(
     request: Request, campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Store
 ) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read."""
@@ -232,13 +216,8 @@ def withdraw(
         return usecase.detail(connection, campaign_id)
 
 
-@router.post(
-    "/campaigns/{campaign_id}/exclusions",
-    operation_id="exclude_recording",
-    summary="Exclude a recording",
-    dependencies=WRITE,
-)
-def exclude(
+@router.post("/campaigns/{campaign_id}/exclusions", summary="Exclude a recording")
+def exclude_recording(
     request: Request, campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table
 ) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read. A correction is the way back."""

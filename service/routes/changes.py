@@ -7,15 +7,15 @@ from fastapi import APIRouter, Path, Request
 from pydantic import BaseModel
 from sqlalchemy import Connection
 
-from service.dependencies import WRITE, CampaignId, SkinId, Store, Table, sender
-from service.middleware.unique_keys import JsonRoute
+from service.dependencies import CampaignId, SkinId, Store, Table, sender
+from service.middleware.json_bodies import JsonRoute
 from service.schemas import changes as models
 from service.schemas.campaigns import CampaignDetail
 from service.schemas.skins import SkinDetail
 from service.store import annotations, campaigns, skins
-from service.usecases import annotations as written
 from service.usecases import campaigns as of_campaigns
 from service.usecases import changes as usecase
+from service.usecases import changes as written
 from service.usecases import skins as of_skins
 
 router = APIRouter(prefix="/v1", route_class=JsonRoute)
@@ -27,13 +27,7 @@ _CHECKS: Mapping[str, Callable[[Any], str | None]] = {
 }
 
 
-@router.patch(
-    "/campaigns/{campaign_id}",
-    operation_id="annotate_campaign",
-    summary="Rename it, or change its notes or tags",
-    tags=["campaigns"],
-    dependencies=WRITE,
-)
+@router.patch("/campaigns/{campaign_id}", summary="Rename it, or change its notes or tags", tags=["campaigns"])
 def annotate_campaign(
     request: Request, campaign_id: CampaignId, annotation: models.CampaignAnnotation, store: Store
 ) -> CampaignDetail:
@@ -43,13 +37,7 @@ def annotate_campaign(
         return of_campaigns.detail(connection, campaign_id)
 
 
-@router.patch(
-    "/skins/{skin_id}",
-    operation_id="annotate_skin",
-    summary="Name it, or change its notes or tags",
-    tags=["skins"],
-    dependencies=WRITE,
-)
+@router.patch("/skins/{skin_id}", summary="Name it, or change its notes or tags", tags=["skins"])
 def annotate_skin(request: Request, skin_id: SkinId, annotation: models.SkinAnnotation, store: Store) -> SkinDetail:
     """Changes what is sent and leaves the rest; its id stays."""
     with store.writing() as connection:
@@ -58,13 +46,7 @@ def annotate_skin(request: Request, skin_id: SkinId, annotation: models.SkinAnno
         return of_skins.detail(connection, root)
 
 
-@router.post(
-    "/campaigns/{campaign_id}/discard",
-    operation_id="discard_campaign",
-    summary="Put a trial away",
-    tags=["campaigns"],
-    dependencies=WRITE,
-)
+@router.post("/campaigns/{campaign_id}/discard", summary="Put a trial away", tags=["campaigns"])
 def discard_campaign(
     request: Request, campaign_id: CampaignId, discarding: models.Discarding, store: Store
 ) -> CampaignDetail:
@@ -74,13 +56,7 @@ def discard_campaign(
         return of_campaigns.detail(connection, campaign_id)
 
 
-@router.post(
-    "/skins/{skin_id}/discard",
-    operation_id="discard_skin",
-    summary="Put an empty skin away",
-    tags=["skins"],
-    dependencies=WRITE,
-)
+@router.post("/skins/{skin_id}/discard", summary="Put an empty skin away", tags=["skins"])
 def discard_skin(request: Request, skin_id: SkinId, discarding: models.Discarding, store: Store) -> SkinDetail:
     """In no list until a campaign arrives for it; 409 where a campaign of it is in use."""
     with store.writing() as connection:
@@ -89,12 +65,7 @@ def discard_skin(request: Request, skin_id: SkinId, discarding: models.Discardin
         return of_skins.detail(connection, root)
 
 
-@router.get(
-    "/campaigns/{campaign_id}/changes",
-    operation_id="campaign_changes",
-    summary="What was changed of it",
-    tags=["campaigns"],
-)
+@router.get("/campaigns/{campaign_id}/changes", summary="What was changed of it", tags=["campaigns"])
 def campaign_changes(campaign_id: CampaignId, store: Store) -> models.Changes:
     """Who, when, why, and whether it can be undone; its exclusions are among them."""
 
@@ -105,7 +76,7 @@ def campaign_changes(campaign_id: CampaignId, store: Store) -> models.Changes:
     return store.read(read)
 
 
-@router.get("/skins/{skin_id}/changes", operation_id="skin_changes", summary="What was changed of it", tags=["skins"])
+@router.get("/skins/{skin_id}/changes", summary="What was changed of it", tags=["skins"])
 def skin_changes(skin_id: SkinId, store: Store) -> models.Changes:
     """Of the skin itself and of those joined to it, withdrawn models among them, not of its campaigns."""
 
@@ -115,13 +86,7 @@ def skin_changes(skin_id: SkinId, store: Store) -> models.Changes:
     return store.read(read)
 
 
-@router.post(
-    "/changes/{change_id}/undo",
-    operation_id="undo_change",
-    summary="Undo a change",
-    tags=["campaigns"],
-    dependencies=WRITE,
-)
+@router.post("/changes/{change_id}/undo", summary="Undo a change", tags=["campaigns"])
 def undo_change(
     request: Request,
     change_id: Annotated[str, Path(description="Id of a change, as `changes` of its campaign or skin list it.")],

@@ -12,8 +12,7 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from service import heavy_answers
 from service.dependencies import StoreToRead, Table
 from service.ingest.reading import READING_SLOTS
-from service.routes.columns_body import CSV, XLSM, XLSX, is_workbook, json_document, parse
-from service.routes.npz_body import NPZ
+from service.routes.columns_body import CSV, NPZ, XLSM, XLSX, is_workbook, json_document, parse
 from service.schemas.columns import AnswerInColumns, Columns, ColumnsRequest
 from service.store import Database
 from underskin.surrogate.sigma_table import SigmaTable

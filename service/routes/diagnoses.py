@@ -3,105 +3,89 @@
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Query
-from fastapi.responses import JSONResponse
+from fastapi import APIRouter, Body, Depends, Query
 from sqlalchemy import Connection
 
-from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, SkinId, Store, Table, number_of_cursor
-from service.jobs.runner import Runner
-from service.middleware.unique_keys import JsonRoute
-from service.routes.idempotency import Idempotency, Idempotent
+from service.dependencies import (
+    CampaignId,
+    Cursor,
+    DiagnosisId,
+    Limit,
+    RunnerInUse,
+    SkinId,
+    Store,
+    Table,
+    number_of_cursor,
+)
+from service.middleware.json_bodies import JsonRoute
+from service.routes.idempotency import Idempotent
 from service.schemas import diagnoses as models
-from service.store import AnyRow, Database, diagnoses
+from service.store import AnyRow, diagnoses
 from service.usecases import diagnoses as usecase
 
 router = APIRouter(prefix="/v1", tags=["diagnoses"], route_class=JsonRoute)
 
 
-@router.post(
-    "/campaigns/{campaign_id}/diagnosis",
-    operation_id="diagnose_campaign",
-    summary="Ask for its diagnosis",
-    status_code=202,
-    dependencies=WRITE,
-    responses={202: {"model": models.Asked}},
-)
-def ask(
-    campaign_id: CampaignId,
-    runner: RunnerInUse,
-    idempotency: Idempotent,
-    store: Store,
-    table: Table,
-    asked: Annotated[models.AskFor, Body(default_factory=models.AskFor)],
-) -> JSONResponse:
+class Queue:
+    """Where a diagnosis is asked for: once where the request has an Idempotency-Key."""
+
+    def __init__(self, idempotency: Idempotent, runner: RunnerInUse, table: Table) -> None:
+        self.sender, self.table = idempotency.sender, table
+        self._idempotency, self._runner = idempotency, runner
+
+    def put(self, body: Any, act: Callable[[Connection], AnyRow]) -> models.Asked:
+        """The diagnosis that `act` put into it, or returned if there is the same already; `body` is the request's."""
+
+        def asked(connection: Connection) -> dict[str, Any]:
+            return models.Asked.model_validate(act(connection), from_attributes=True).model_dump()
+
+        answer = self._idempotency.answer(body, asked)
+        self._runner.stir()
+        return models.Asked(**answer)
+
+
+InQueue = Annotated[Queue, Depends()]
+
+
+@router.post("/campaigns/{campaign_id}/diagnosis", summary="Ask for its diagnosis", status_code=202)
+def diagnose_campaign(
+    campaign_id: CampaignId, queue: InQueue, asked: Annotated[models.AskFor, Body(default_factory=models.AskFor)]
+) -> models.Asked:
     """Puts it into the queue; excluded recordings are left out. A campaign that was diagnosed as it is now, with this
     table, version and catalogue of mechanisms, is answered with that diagnosis.
     """
-    without = asked.without
 
     def act(connection: Connection) -> AnyRow:
-        return usecase.ask(connection, campaign_id, table, idempotency.sender, without)
+        return usecase.ask(connection, campaign_id, queue.table, queue.sender, asked.without)
 
-    return _queued(idempotency, store, runner, without or None, act)
+    return queue.put(asked.without or None, act)
 
 
-@router.post(
-    "/skins/{skin_id}/diagnosis",
-    operation_id="diagnose_skin",
-    summary="Ask for a diagnosis of its campaigns together",
-    status_code=202,
-    dependencies=WRITE,
-    responses={202: {"model": models.Asked}},
-)
-def ask_of_skin(
-    skin_id: SkinId,
-    runner: RunnerInUse,
-    idempotency: Idempotent,
-    store: Store,
-    table: Table,
-    asked: Annotated[models.AskForSkin, Body(default_factory=models.AskForSkin)],
-) -> JSONResponse:
+@router.post("/skins/{skin_id}/diagnosis", summary="Ask for a diagnosis of its campaigns together", status_code=202)
+def diagnose_skin(
+    skin_id: SkinId, queue: InQueue, asked: Annotated[models.AskForSkin, Body(default_factory=models.AskForSkin)]
+) -> models.Asked:
     """Puts one diagnosis of all of them into the queue, or of those chosen: what acts in all, and since when. The same
     request on campaigns that have not changed is answered with that diagnosis. 409 where fewer than two campaigns in
     use have FRFs.
     """
 
     def act(connection: Connection) -> AnyRow:
-        return usecase.ask_of_skin(connection, skin_id, table, idempotency.sender, asked)
+        return usecase.ask_of_skin(connection, skin_id, queue.table, queue.sender, asked)
 
-    return _queued(idempotency, store, runner, asked.model_dump(), act)
+    return queue.put(asked.model_dump(), act)
 
 
-@router.post(
-    "/fleets/diagnosis",
-    operation_id="diagnose_fleet",
-    summary="Ask for a diagnosis of several skins together",
-    status_code=202,
-    dependencies=WRITE,
-    responses={202: {"model": models.Asked}},
-)
-def ask_of_fleet(
-    runner: RunnerInUse, idempotency: Idempotent, store: Store, table: Table, asked: models.AskForFleet
-) -> JSONResponse:
+@router.post("/fleets/diagnosis", summary="Ask for a diagnosis of several skins together", status_code=202)
+def diagnose_fleet(queue: InQueue, asked: models.AskForFleet) -> models.Asked:
     """Puts one diagnosis of all campaigns of these skins into the queue: what they have in common, and which skin
     departs from the others. The same request on campaigns that have not changed is answered with that diagnosis.
     """
 
     def act(connection: Connection) -> AnyRow:
-        return usecase.ask_of_fleet(connection, table, idempotency.sender, asked)
+        return usecase.ask_of_fleet(connection, queue.table, queue.sender, asked)
 
-    return _queued(idempotency, store, runner, asked.model_dump(), act)
-
-
-def _queued(
-    idempotency: Idempotency, store: Database, runner: Runner, body: Any, act: Callable[[Connection], AnyRow]
-) -> JSONResponse:
-    """The answer to a request for a diagnosis."""
-    answer = idempotency.answer(
-        store, body, lambda connection: models.Asked.model_validate(act(connection), from_attributes=True).model_dump()
-    )
-    runner.stir()
-    return JSONResponse(answer, status_code=202)
+    return queue.put(asked.model_dump(), act)
 
 
 @router.get("/diagnoses", operation_id="diagnoses", summary="Diagnoses, the latest first")
@@ -111,8 +95,8 @@ def listed(
     skin: Annotated[str | None, Query(description="Of campaigns of this skin and of those joined with it.")] = None,
     kind: Annotated[models.DiagnosisKind | None, Query(description="Only those of this kind.")] = None,
     state: Annotated[models.State | None, Query(description="Only those in this state.")] = None,
-    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
-    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
 ) -> models.DiagnosisList:
     """Without their reports; a page holds `limit` of them."""
     filters = diagnoses.DiagnosisFilters(campaign, skin, state, kind)
@@ -122,8 +106,8 @@ def listed(
     return models.DiagnosisList(diagnoses=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
 
-@router.get("/diagnoses/{diagnosis_id}", operation_id="diagnosis", summary="One diagnosis")
-def one(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
+@router.get("/diagnoses/{diagnosis_id}", summary="One diagnosis")
+def diagnosis(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
     """How far it is and, once it is done, its report."""
     with store.reading() as connection:
         row = diagnoses.find(connection, diagnosis_id)
@@ -131,10 +115,8 @@ def one(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
         return models.Diagnosis(**usecase.entry(connection, row), report=report)
 
 
-@router.delete(
-    "/diagnoses/{diagnosis_id}", operation_id="cancel_diagnosis", summary="Cancel a diagnosis", dependencies=WRITE
-)
-def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> models.DiagnosisEntry:
+@router.delete("/diagnoses/{diagnosis_id}", summary="Cancel a diagnosis")
+def cancel_diagnosis(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> models.DiagnosisEntry:
     """Ends its process, or takes it out of the queue. One that is done or has failed stays: 409."""
     with store.writing() as connection:
         diagnoses.cancel(connection, diagnosis_id)

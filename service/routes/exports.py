@@ -7,10 +7,9 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import WRITE, SkinId, Store
+from service.dependencies import SkinId, Store
 from service.ingest import skin_imports
-from service.ingest.form_fields import split
-from service.ingest.uploads import UploadFolder, received
+from service.ingest.uploads import UploadFolder, received, split
 from service.problems import Refusal
 from service.routes.temporary_files import MadeFile, made_file
 from service.schemas.skins import Imported
@@ -26,11 +25,7 @@ _FILE: dict[str, Any] = {"content": {_MEDIA_TYPE: {"schema": {"type": "string", 
 
 
 @router.get(
-    "/skins/{skin_id}/export",
-    operation_id="export_skin",
-    summary="All that is kept of a skin",
-    response_class=MadeFile,
-    responses={200: _FILE},
+    "/skins/{skin_id}/export", summary="All that is kept of a skin", response_class=MadeFile, responses={200: _FILE}
 )
 async def export_skin(skin_id: SkinId, request: Request, store: Store) -> Response:
     """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, its rigs,
@@ -48,9 +43,7 @@ def _exported(store: Database, request: Request, skin_id: str) -> Response:
 
 @router.post(
     "/skins/import",
-    operation_id="import_skin",
     summary="Bring in a skin that was exported",
-    dependencies=WRITE,
     openapi_extra={
         "requestBody": {"required": True, "content": {"application/octet-stream": _FILE["content"][_MEDIA_TYPE]}}
     },

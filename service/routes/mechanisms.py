@@ -7,8 +7,8 @@ import yaml
 from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
 
-from service.dependencies import WRITE, Store
-from service.middleware.unique_keys import require_unique_keys
+from service.dependencies import Store
+from service.middleware.json_bodies import require_unique_keys
 from service.problems import Refusal, validated
 from service.schemas.mechanisms import KeepFound, MechanismEntry, MechanismList
 from service.usecases import mechanisms as usecase
@@ -59,21 +59,14 @@ _BODY: dict[str, Any] = {
 }
 
 
-@router.get("/mechanisms", operation_id="mechanisms", summary="The catalogue of mechanisms")
-def listed() -> MechanismList:
+@router.get("/mechanisms", summary="The catalogue of mechanisms")
+def mechanisms() -> MechanismList:
     """Every mechanism that diagnoses know by name: underskin's, those of other packages, and the lab's own."""
     return MechanismList(mechanisms=usecase.entries(), unusable=usecase.unusable())
 
 
-@router.post(
-    "/mechanisms",
-    operation_id="keep_mechanism",
-    summary="Keep one of the lab's own",
-    status_code=201,
-    dependencies=WRITE,
-    openapi_extra=_BODY,
-)
-async def keep(request: Request, store: Store) -> MechanismEntry:
+@router.post("/mechanisms", summary="Keep one of the lab's own", status_code=201, openapi_extra=_BODY)
+async def keep_mechanism(request: Request, store: Store) -> MechanismEntry:
     """Diagnoses that are asked for from now on know it by name; 409 where the name is taken. Its law is an expression,
     of which no code is ever executed."""
     body = await request.body()
@@ -88,13 +81,8 @@ async def keep(request: Request, store: Store) -> MechanismEntry:
         raise error.of_field("mechanism", None) from None
 
 
-@router.delete(
-    "/mechanisms/{name}",
-    operation_id="discard_mechanism",
-    summary="Discard one of the lab's own",
-    dependencies=WRITE,
-)
-def discard(
+@router.delete("/mechanisms/{name}", summary="Discard one of the lab's own")
+def discard_mechanism(
     name: Annotated[str, Path(description="Of one of the lab's own mechanisms.")], store: Store
 ) -> MechanismEntry:
     """Diagnoses know it no more; its file is kept apart, and reports that name it stay as they are. 409 where it is

@@ -48,7 +48,7 @@ class UmbridgeProblem(BaseModel):
     error: UmbridgeError
 
 
-@router.get("/openapi.json", operation_id="openapi", summary="This document")
+@router.get("/openapi.json", summary="This document")
 async def openapi(request: Request) -> dict[str, Any]:
     """OpenAPI 3.1; says that a key is needed where one is."""
     described = dict(document(request.app))

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request
 
-from service.dependencies import WRITE, SkinId, Store, Table, sender
-from service.middleware.unique_keys import JsonRoute
+from service.dependencies import Cursor, Limit, SkinId, Store, Table, sender
+from service.middleware.json_bodies import JsonRoute
 from service.schemas import skins as models
 from service.store import skins
 from service.usecases import d33_cache
@@ -18,8 +18,8 @@ router = APIRouter(prefix="/v1", tags=["skins"], route_class=JsonRoute)
 def listed(
     store: Store,
     id_contains: Annotated[str | None, Query(description="Only those whose id contains this.")] = None,
-    limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
-    cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
 ) -> models.SkinList:
     """Those joined to another are under that one."""
     rows = store.read(skins.listed, id_contains, cursor, limit + 1)
@@ -27,21 +27,21 @@ def listed(
     return models.SkinList(skins=page, next=rows[limit - 1].id if len(rows) > limit else None)
 
 
-@router.get("/skins/{skin_id}", operation_id="skin", summary="One skin")
-def one(skin_id: SkinId, store: Store) -> models.SkinDetail:
+@router.get("/skins/{skin_id}", summary="One skin")
+def skin(skin_id: SkinId, store: Store) -> models.SkinDetail:
     """With what was joined to it; of a joined skin, the one that it counts as."""
     return store.read(usecase.detail, skin_id)
 
 
-@router.post("/skins/{skin_id}/join", operation_id="join_skins", summary="Join another skin to it", dependencies=WRITE)
-def join(request: Request, skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
+@router.post("/skins/{skin_id}/join", summary="Join another skin to it")
+def join_skins(request: Request, skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
     """Two ids turned out to mean one skin: from now on figures of this one use the campaigns of both."""
     usecase.join(store, skin_id, join.skin_id, join.reason, sender(request))
     return store.read(usecase.detail, skin_id)
 
 
-@router.get("/skins/{skin_id}/history", operation_id="skin_history", summary="d33 over time")
-def history(
+@router.get("/skins/{skin_id}/history", summary="d33 over time")
+def skin_history(
     skin_id: SkinId,
     store: Store,
     table: Table,

@@ -9,7 +9,7 @@ from orjson import dumps, loads
 
 from service.dependencies import Table
 from service.middleware.asgi_middleware import HotRoute, are_numbers
-from service.middleware.unique_keys import JsonRoute
+from service.middleware.json_bodies import JsonRoute
 from service.problems import Refusal
 from service.schemas import umbridge as models
 from service.usecases.umbridge_models import MODELS, UmbridgeModel
@@ -19,57 +19,57 @@ from underskin.units import Floats
 router = APIRouter(prefix="/umbridge", tags=["umbridge"], route_class=JsonRoute)
 
 
-@router.get("/Info", operation_id="umbridge_info", summary="Protocol and models")
-async def info() -> models.Info:
+@router.get("/Info", summary="Protocol and models")
+async def umbridge_info() -> models.Info:
     """Version of the protocol, and the models' names."""
     return models.Info(protocolVersion=1.0, models=list(MODELS))
 
 
-@router.post("/ModelInfo", operation_id="umbridge_model_info", summary="What a model supports")
-async def model_info(request: models.ModelRequest) -> models.ModelInfo:
+@router.post("/ModelInfo", summary="What a model supports")
+async def umbridge_model_info(request: models.ModelRequest) -> models.ModelInfo:
     """Values and first derivatives."""
     _model(request)
     return models.ModelInfo(support={"Evaluate": True, "Gradient": True, "ApplyJacobian": True, "ApplyHessian": False})
 
 
-@router.post("/InputSizes", operation_id="umbridge_input_sizes", summary="Lengths of the inputs")
-async def input_sizes(request: models.ModelRequest) -> models.InputSizes:
+@router.post("/InputSizes", summary="Lengths of the inputs")
+async def umbridge_input_sizes(request: models.ModelRequest) -> models.InputSizes:
     """One vector."""
     return models.InputSizes(inputSizes=[len(_model(request).inputs)])
 
 
-@router.post("/OutputSizes", operation_id="umbridge_output_sizes", summary="Lengths of the outputs")
-async def output_sizes(request: models.ModelRequest) -> models.OutputSizes:
+@router.post("/OutputSizes", summary="Lengths of the outputs")
+async def umbridge_output_sizes(request: models.ModelRequest) -> models.OutputSizes:
     """One number."""
     _model(request)
     return models.OutputSizes(outputSizes=[1])
 
 
-@router.post("/Evaluate", operation_id="umbridge_evaluate", summary="A model's value")
-async def evaluate(request: models.Evaluation, table: Table) -> models.Values:
+@router.post("/Evaluate", summary="A model's value")
+async def umbridge_evaluate(request: models.Evaluation, table: Table) -> models.Values:
     """σ or the FRF [pC/N] at one point."""
     model = _model(request)
     return models.Values(output=[[model.value(table, _point(model, request))]])
 
 
-@router.post("/Gradient", operation_id="umbridge_gradient", summary="Gradient of a model")
-async def gradient(request: models.GradientRequest, table: Table) -> models.Vector:
+@router.post("/Gradient", summary="Gradient of a model")
+async def umbridge_gradient(request: models.GradientRequest, table: Table) -> models.Vector:
     """sens · ∂output/∂input."""
     slopes = _slopes(table, request)
     _require(len(request.sens) == 1, "sens must have length 1")
     return models.Vector(output=_finite_product(slopes, np.broadcast_to(request.sens, slopes.shape)).tolist())
 
 
-@router.post("/ApplyJacobian", operation_id="umbridge_apply_jacobian", summary="Derivative along a direction")
-async def apply_jacobian(request: models.JacobianRequest, table: Table) -> models.Vector:
+@router.post("/ApplyJacobian", summary="Derivative along a direction")
+async def umbridge_apply_jacobian(request: models.JacobianRequest, table: Table) -> models.Vector:
     """∂output/∂input · vec."""
     slopes = _slopes(table, request)
     _require(len(request.vec) == slopes.size, f"vec must have length {slopes.size}")
     return models.Vector(output=[float(_finite_product(slopes, np.array(request.vec)).sum())])
 
 
-@router.post("/ApplyHessian", operation_id="umbridge_apply_hessian", summary="Not supported")
-async def apply_hessian(request: models.HessianRequest) -> models.Vector:
+@router.post("/ApplyHessian", summary="Not supported")
+async def umbridge_apply_hessian(request: models.HessianRequest) -> models.Vector:
     """Always refused, as the protocol says of models without second derivatives."""
     _model(request)
     raise Refusal(400, "ApplyHessian is not supported by this model.", title="Unsupported feature")

@@ -70,8 +70,8 @@ _OF_CHECK: Mapping[Callable[..., Any], Schema] = {
 
 _WORDS: Mapping[str, str] = {
     "id": "Its name, one of its own.",
-    "x_mm": "Its centre along the skin's length [mm].",
-    "y_mm": "Its centre along the skin's width [mm].",
+    "x_mm": "Its centre along the skin's length [mm]; may be left out of a skin's only sensor.",
+    "y_mm": "Its centre along the skin's width [mm]; as `x_mm`.",
     "poisson_ratio": "Poisson's ratio ν of the elastomer, 0 to 0.5 [-].",
     "thickness_mm": "Thickness h of the layer over the sensors [mm]; required by recordings of kind `frf`.",
     "youngs_modulus_mpa": "Young's modulus E of the layer [MPa]; required by recordings of kind `frf`.",

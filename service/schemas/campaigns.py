@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, WithJsonSchema
 
 from service.problems import validated
+from service.schemas.base import StrictRequest
 from underskin.errors import ErrorCode, conflicting
 from underskin.recordings.frf.estimators import Estimator
 
@@ -150,17 +151,13 @@ class CampaignDetail(CampaignEntry):
     notes: list[str] = Field(description="What its reader remarked.")
 
 
-class _Request(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class Withdrawal(_Request):
+class Withdrawal(StrictRequest):
     """Takes a campaign out of all figures; it stays."""
 
     reason: ReasonText = Field(description="Why; shown with every figure that leaves it out.")
 
 
-class Exclusion(_Request):
+class Exclusion(StrictRequest):
     """Takes a recording out of all figures; it stays."""
 
     recording: str = Field(description="Its id in the campaign.", examples=["r1"])

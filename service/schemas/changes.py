@@ -2,18 +2,15 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
+from service.schemas.base import StrictRequest
 from service.schemas.campaigns import ReasonText
 
 Action = Literal["annotate", "withdraw", "exclude", "correct", "join", "discard", "undo"]
 
 
-class _Request(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class _Annotation(_Request):
+class _Annotation(StrictRequest):
     """What is to be changed; a field that is not sent stays as it is."""
 
     remark: str | None = Field(default=None, description="Notes, in up to 10,000 characters; null for none.")
@@ -40,7 +37,7 @@ class SkinAnnotation(_Annotation):
     )
 
 
-class Discarding(_Request):
+class Discarding(StrictRequest):
     """Puts a skin or a trial campaign away: in no list any more; nothing of it is lost."""
 
     reason: ReasonText = Field(description="Why; kept with it.")

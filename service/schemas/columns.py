@@ -10,8 +10,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import orjson
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, InstanceOf, Tag, WithJsonSchema
+from pydantic import BaseModel, Discriminator, Field, InstanceOf, Tag, WithJsonSchema
 
+from service.schemas.base import StrictRequest
 from underskin.findings.codes import FindingCode
 from underskin.prediction.columns import limits_and_statuses, statuses, to_csv
 from underskin.prediction.pressed_skin import Words
@@ -51,10 +52,8 @@ Numbers = Annotated[list[_Number], Field(fail_fast=True)]
 NumbersPerRow = Annotated[list[Numbers], Field(fail_fast=True)]
 
 
-class ColumnsRequest(BaseModel):
+class ColumnsRequest(StrictRequest):
     """A request in columns. Subclasses name the fields that are not columns, since these are read otherwise."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     # The same text or boolean in every row of a CSV body, and lists of numbers, which CSV cannot carry.
     constants: ClassVar[frozenset[str]] = frozenset({"model"})

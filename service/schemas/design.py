@@ -4,24 +4,17 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.schemas.magnitudes import Representable
+from service.schemas.base import PressedSkin
 from underskin.surrogate.sigma_table import ContactName
 
 Axis = Literal["a_over_h", "rt_over_h", "load_parameter"]
 
 
-class DesignRequest(BaseModel):
-    """A skin, a sphere that presses it, and the pitch of its array."""
+class DesignRequest(PressedSkin):
+    """A skin of an incompressible layer, a sphere that presses it, and the pitch of its array."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
-    thickness_mm: Representable = Field(description="Thickness h of the layer over the sensors [mm].", examples=[2.5])
-    youngs_modulus_mpa: Representable = Field(
-        description="Young's modulus E of the layer, incompressible [MPa].", examples=[16.0]
-    )
-    sensor_radius_mm: Representable = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
-    indenter_radius_mm: Representable = Field(description="Radius R of the sphere [mm].", examples=[4.0])
-    preload_n: Representable = Field(description="Force F of the sphere [N].", examples=[1.0])
     pitch_mm: float = Field(
         gt=0, le=1e4, description="Distance of neighbouring sensors of a square array [mm].", examples=[4.0]
     )

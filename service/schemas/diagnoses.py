@@ -2,11 +2,10 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, Field, StringConstraints
 
-from service.schemas.described import DescribedBy
-from service.schemas.report import Report, ReportMechanism, Verdict
-from service.schemas.report_fit import Fit, Provenance
+from service.schemas.base import DescribedBy, StrictRequest
+from service.schemas.report import Fit, Provenance, Report, ReportMechanism, Verdict
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 DiagnosisKind = Literal["campaign", "skin", "fleet"]
@@ -23,10 +22,8 @@ class Asked(BaseModel):
     state: State = Field(description="`done` where the same was diagnosed before, as it is now.")
 
 
-class AskFor(BaseModel):
+class AskFor(StrictRequest):
     """How something is to be diagnosed."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     without: list[str] = Field(
         default_factory=list,
@@ -106,10 +103,8 @@ class DiagnosisList(BaseModel):
     next: str | None = Field(description="Send it as `cursor` for the next page; null on the last.")
 
 
-class Adoption(BaseModel):
+class Adoption(StrictRequest):
     """Makes an explained diagnosis the skin's model."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     diagnosis_id: str = Field(
         description="Of one of the skin's campaigns: its verdict is `explained`, or `ambiguous` where all that remains "

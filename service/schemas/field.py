@@ -4,23 +4,18 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from service.schemas.base import PressedSkin
 from service.schemas.columns import Status
-from service.schemas.magnitudes import Representable
 from underskin.surrogate.sigma_table import ContactName
 
 MOST_RADII, MOST_DEPTHS = 301, 101
 
 
-class FieldQuery(BaseModel):
+class FieldQuery(PressedSkin):
     """A skin and a sphere above the centre of a sensor, in lab units."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-    thickness_mm: Representable = Field(description="Thickness h of the layer over the sensors [mm].", examples=[2.5])
-    youngs_modulus_mpa: Representable = Field(description="Young's modulus E of the layer [MPa].", examples=[16.0])
-    sensor_radius_mm: Representable = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
-    indenter_radius_mm: Representable = Field(description="Radius R of the sphere [mm].", examples=[4.0])
-    preload_n: Representable = Field(description="Force F of the sphere [N].", examples=[1.0])
     poisson_ratio: float = Field(
         default=0.5,
         description="Poisson's ratio ν of the layer, 0 to 0.5. Below 0.5 the stress is that of the linear layer.",

@@ -1,6 +1,8 @@
 """Mechanisms: requests and answers."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
+
+from service.schemas.base import StrictRequest
 
 
 class MechanismParameter(BaseModel):
@@ -40,10 +42,8 @@ class MechanismList(BaseModel):
     unusable: list[UnusableFile] = Field(description="Files of the lab's own that are left out.")
 
 
-class KeepFound(BaseModel):
+class KeepFound(StrictRequest):
     """Keeps the law that a diagnosis found beside the catalogue."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     diagnosis_id: str = Field(description="A diagnosis whose report has `unnamed`.")
     name: str = Field(description="What to call it: lower case letters, digits and _.", examples=["warm_skin"])

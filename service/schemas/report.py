@@ -8,21 +8,247 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from service.schemas.report_fit import Fit, Parameter, Provenance, UnnamedLaw
-from service.schemas.report_several import (
-    CampaignLevel,
-    Contradiction,
-    KindParameter,
-    Population,
-    Scope,
-    SensorLevel,
-    SkinValue,
-)
 from underskin.findings.codes import FindingCode
 
+RecordingKind = Literal["frf", "indentation", "compression"]
 Verdict = Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
 Origin = Literal["skin", "rig", "chain"]
-RecordingKind = Literal["frf", "indentation", "compression"]
+
+
+class Parameter(BaseModel):
+    """A fitted parameter with its 95 % interval."""
+
+    name: str = Field(description="Its name.", examples=["tip_mass"])
+    unit: str = Field(description="Of the three numbers; - for none.", examples=["g"])
+    value: float | None = Field(description="Its most probable value.")
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+    at_bound: Literal["low", "high"] | None = Field(
+        default=None, description="The end of its search that the value lies at or beyond: it is no result then."
+    )
+
+
+class FitScore(BaseModel):
+    """How well the recordings are described."""
+
+    rmse_percent: float | None = Field(
+        description="100 √(Σ|measured − model|² / Σ|measured|²) [%]; of indentations by least squares."
+    )
+    correlated_rmse_percent: float | None = Field(
+        default=None, description="Of curves: the same by the fit that knows that errors are correlated [%]."
+    )
+    least_squares_modulus_mpa: float | None = Field(
+        default=None, description="Of indentations: Young's modulus by least squares [MPa]."
+    )
+    heldout_rmse_percent: float | None = Field(description="The same on recordings that were held out [%].")
+    log_score: float | None = Field(description="Mean logarithm of the density of a held-out recording.")
+    youngs_modulus: Parameter | None = Field(default=None, description="Of curves: Young's modulus.")
+
+
+class HeldOutGroup(BaseModel):
+    """A group of recordings that was predicted from the others."""
+
+    group: str = Field(description="Which recordings, such as the highest preload.")
+    chosen: list[str] = Field(description="The mechanisms chosen without it.")
+    before_rmse_percent: float | None = Field(description="Error of the paper's model on it [%].")
+    after_rmse_percent: float | None = Field(description="Error with these mechanisms on it [%].")
+    noise_floor_percent: float | None = Field(description="Error that noise alone makes [%].")
+
+
+class FittedNoise(BaseModel):
+    """The noise that the fit found."""
+
+    gain_percent: float | None = Field(description="Standard deviation of a recording's gain [%].")
+    position_mm: float | None = Field(description="Standard deviation of the sphere's position, each axis [mm].")
+    line_level: float | None = Field(description="Noise of a line over what its coherence says [-].")
+    smooth_percent: float | None = Field(description="Standard deviation of an error that is smooth over lines [%].")
+
+
+class Fit(BaseModel):
+    """How much better the recordings are described."""
+
+    before: FitScore = Field(description="By the paper's model.")
+    after: FitScore = Field(description="With what was found.")
+    mechanisms: list[str] = Field(description="The mechanisms of `after`.")
+    noise_floor_percent: float | None = Field(description="Error that noise alone makes of a new recording [%].")
+    groups: list[HeldOutGroup] = Field(description="The groups held out.")
+    noise: FittedNoise = Field(description="The noise.")
+
+
+class RivalLaw(BaseModel):
+    """Another law that would describe the same misfit."""
+
+    acts_on: str = Field(description="What it changes.")
+    axis: str = Field(description="What it depends on.")
+    form: str = Field(description="How.")
+    probability: float = Field(description="Its share of all laws, 0 to 1.")
+
+
+class HeldOutErrors(BaseModel):
+    """Errors on recordings that were held out."""
+
+    before: float | None = Field(description="By the paper's model [%].")
+    after: float | None = Field(description="With the law [%].")
+
+
+class CoursePoint(BaseModel):
+    """A point of a course that has no form."""
+
+    at: float | str | None = Field(description="Where on the axis: a number, or a word.")
+    change: float | None = Field(description="The change there: relative, of a force in N, of a place in mm.")
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+
+
+class UnnamedLaw(BaseModel):
+    """A law that no mechanism of the catalogue describes."""
+
+    acts_on: str = Field(description="What it changes.", examples=["modulus"])
+    axis: str = Field(description="What it depends on.", examples=["time_of_day"])
+    form: str = Field(description="How.", examples=["periodic"])
+    expression: str = Field(description="The law as a formula.")
+    parameters: list[Parameter] = Field(description="Its numbers.")
+    probability: float = Field(description="Its share of all laws, 0 to 1; the report's is that of any law.")
+    rivals: list[RivalLaw] = Field(description="Others, the most probable first.")
+    heldout_rmse_percent: HeldOutErrors = Field(description="What it is worth on recordings that were held out [%].")
+    range: dict[str, list[float | str | None]] = Field(description="Where it holds: ends of the axis, or words.")
+    course: list[CoursePoint] | None = Field(default=None, description="Of the form `free`: the course itself.")
+
+
+class AdoptableLaw(BaseModel):
+    """The law as an adopted model uses it."""
+
+    law: str = Field(description="Its name in the grammar of laws.")
+    parameters: dict[str, float] = Field(description="By name, in more digits.")
+
+
+class Alike(BaseModel):
+    """Answers that predict these recordings alike."""
+
+    probability: float = Field(description="Of all of them together, 0 to 1.")
+    rivals: list[list[str]] = Field(description="Their mechanisms.")
+    differ_percent: float | None = Field(description="By how much their predictions differ at most [%].")
+
+
+class SetsTried(BaseModel):
+    """How many sets of mechanisms were looked at."""
+
+    tried: int = Field(description="Begun.")
+    fitted: int = Field(description="Fitted to the end.")
+
+
+class EachVerdict(BaseModel):
+    """The verdict of one campaign or one skin alone."""
+
+    campaign: str | None = Field(default=None, description="Name of the campaign.")
+    skin: str | None = Field(default=None, description="Id of the skin.")
+    verdict: str = Field(description="Its own verdict.")
+    probability: float = Field(description="Of what its own report states, 0 to 1.")
+
+
+class Provenance(BaseModel):
+    """What the report was made with: the same input, versions and tables give the same report."""
+
+    underskin: str = Field(description="Version of underskin.")
+    numpy: str = Field(description="Version of NumPy.")
+    scipy: str = Field(description="Version of SciPy.")
+    tables: dict[str, str] = Field(description="SHA-256 of each table.")
+    seed: int = Field(description="Of the random numbers.")
+    mechanisms: dict[str, str] | None = Field(
+        default=None, description="Mechanisms that are not underskin's own, with their package or file."
+    )
+    without: list[str] | None = Field(default=None, description="Mechanisms that were left out of the catalogue.")
+    unnamed: AdoptableLaw | None = Field(default=None, description="Of `unexplained`: the law.")
+    alike: Alike | None = Field(default=None, description="Of `ambiguous`: answers that predict alike.")
+    sets_of_mechanisms: SetsTried | None = Field(default=None, description="How far the search went.")
+    each: list[EachVerdict] | None = Field(default=None, description="Of several: the verdict of each alone.")
+
+
+class Scope(BaseModel):
+    """Where a mechanism acts, of several campaigns or skins."""
+
+    campaigns: list[str] | None = Field(default=None, description="Names of the campaigns.")
+    sensors: list[str] | None = Field(default=None, description="Ids of the sensors.")
+    skins: list[str] | None = Field(default=None, description="Ids of the skins.")
+    since: str | None = Field(default=None, description="The date from which on it is there.")
+
+
+class RelativeLevel(BaseModel):
+    """The interval of a d33 to compare it with other sensors and campaigns, as wide as by the leading answer alone."""
+
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+
+
+class SensorLevel(BaseModel):
+    """d33 of one sensor in one of several campaigns, over all answers by known mechanisms."""
+
+    campaign: str = Field(description="Name of the campaign.")
+    sensor: str = Field(description="Id of the sensor.")
+    unit: str = Field(description="Of the three numbers.")
+    value: float | None = Field(description="Its estimate.")
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+    relative: RelativeLevel | None = Field(default=None, description="To compare sensors and campaigns.")
+
+
+class CampaignLevel(BaseModel):
+    """d33 of the array in one of several campaigns, over the sensors that these share and over all answers by known
+    mechanisms."""
+
+    campaign: str = Field(description="Name of the campaign.")
+    unit: str = Field(description="Of the three numbers.")
+    value: float | None = Field(description="Its estimate.")
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+    relative: RelativeLevel | None = Field(default=None, description="To compare campaigns.")
+
+
+class SkinValue(BaseModel):
+    """A quantity of one skin of a fleet."""
+
+    skin: str = Field(description="Id of the skin.")
+    value: float | None = Field(description="Its estimate.")
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+
+
+class KindParameter(BaseModel):
+    """A parameter as one kind of recording alone tells it."""
+
+    kind: RecordingKind = Field(description="The kind.")
+    parameter: str = Field(description="Name of the parameter.", examples=["youngs_modulus"])
+    unit: str = Field(description="Of the three numbers; - for none.")
+    value: float | None = Field(description="Its estimate.")
+    low: float | None = Field(description="Lower end of its 95 % interval.")
+    high: float | None = Field(description="Upper end of its 95 % interval.")
+
+
+class Contradiction(BaseModel):
+    """Kinds of recordings that are not of one material."""
+
+    parameter: str = Field(description="What they disagree on.")
+    kinds: list[RecordingKind] = Field(description="The kinds.")
+    statement: str = Field(description="The same in words.")
+
+
+class Departure(BaseModel):
+    """A skin that departs from its fleet."""
+
+    skin: str = Field(description="Id of the skin.")
+    value: float | None = Field(description="Its own value.")
+    probability: float = Field(description="Probability that it departs in this, 0 to 1.")
+
+
+class Population(BaseModel):
+    """One quantity over the skins of a fleet."""
+
+    parameter: str = Field(description="Name of the quantity.", examples=["thickness"])
+    unit: str = Field(description="Of all numbers; - for none.")
+    mean: float | None = Field(description="Mean of the skins that do not depart.")
+    sd: float | None = Field(description="Their standard deviation.")
+    departures: list[Departure] = Field(description="Skins that depart in this quantity.")
+    skins: list[SkinValue] = Field(description="One entry a skin.")
 
 
 class LocatedAxis(BaseModel):

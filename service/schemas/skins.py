@@ -2,8 +2,9 @@
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
+from service.schemas.base import StrictRequest
 from service.schemas.campaigns import ReasonText
 
 
@@ -50,10 +51,8 @@ class SkinDetail(BaseModel):
     rig: dict[str, Any] | None = Field(description="The rig description in use for its files (`rig/1`).")
 
 
-class Join(BaseModel):
+class Join(StrictRequest):
     """Says that two ids mean one skin."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     skin_id: str = Field(description="The skin that counts as this one from now on.", examples=["palm-3b"])
     reason: ReasonText = Field(description="Why.")

@@ -1,17 +1,14 @@
 """What `POST /v1/stress` takes and answers, as OpenAPI describes it; `underskin.stress_request` checks it."""
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from service.schemas.base import StrictRequest
 from service.schemas.columns import AnswerInColumns, FindingModel
 from underskin.array_stress.request import MOST_CONTACTS
 from underskin.surrogate.sigma_table import ContactName
 
 
-class _StressModel(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class StressSensor(_StressModel):
+class StressSensor(StrictRequest):
     """A sensor of the array."""
 
     id: str = Field(description="Its name, one of its own.")
@@ -19,7 +16,7 @@ class StressSensor(_StressModel):
     y_mm: float = Field(description="Its centre along the skin's width [mm].")
 
 
-class StressContact(_StressModel):
+class StressContact(StrictRequest):
     """A rigid sphere, pressed in without friction; its tangential force is spread like its pressure."""
 
     x_mm: float = Field(description="Centre of the contact, in the sensors' frame [mm].")
@@ -31,7 +28,7 @@ class StressContact(_StressModel):
     )
 
 
-class StressMap(_StressModel):
+class StressMap(StrictRequest):
     """Pressure into the skin, constant around each of evenly spaced places."""
 
     x_mm: list[float] = Field(min_length=2, description="Places of the columns, evenly spaced, ascending [mm].")
@@ -39,7 +36,7 @@ class StressMap(_StressModel):
     pressure_mpa: list[list[float]] = Field(min_length=2, description="Pressure, y × x, at least 0 [MPa].")
 
 
-class StressRequest(_StressModel):
+class StressRequest(StrictRequest):
     """A skin with its sensors, and either contacts or a pressure map."""
 
     thickness_mm: float = Field(gt=0, description="Thickness h of the layer over the sensors [mm].")

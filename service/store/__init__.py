@@ -2,14 +2,17 @@
 
 from pathlib import Path
 
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from service.store import migrate
 from service.store.engine import Database, StorageFailed, StorageFull, database
 from service.store.errors import Conflict, Missing, StoreError, StoreMoved
 from service.store.tables import AnyRow
 
+STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)  # as a thread sees it that goes on
+
 __all__ = [
+    "STORE_FAILED",
     "AnyRow",
     "Conflict",
     "Database",

@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import Connection, func, insert, select
 
 from service.schemas.changes import Action
-from service.store import moments
+from service.store import times
 from service.store.errors import Missing
 from service.store.tables import AnyRow, changes, skins
 
@@ -35,7 +35,7 @@ def record(
         "skin_id": skin_id,
         "campaign_id": campaign_id,
         "recording": recording,
-        "at": moments.next_of(connection, [skin_id]),
+        "at": times.next_of(connection, [skin_id]),
         "made_from": made_from,
         "reason": reason,
         "before": dict(before or {}),

@@ -14,7 +14,7 @@ from sqlalchemy import ColumnElement, Connection, Select, insert, select, text, 
 
 from service.schemas.diagnoses import DiagnosisKind, State
 from service.store import campaigns as kept_campaigns
-from service.store import changes, diagnosed_together, moments, skins
+from service.store import changes, diagnosed_together, skins, times
 from service.store.campaigns import Excluded
 from service.store.codec import compressed, decompressed
 from service.store.diagnosed_together import Member, Together
@@ -116,7 +116,7 @@ def _same(connection: Connection, wanted: Mapping[str, Any]) -> AnyRow | None:
 def _queued(connection: Connection, skin_ids: Collection[str], wanted: Mapping[str, Any]) -> AnyRow:
     """A new diagnosis, of campaigns of these skins."""
     diagnosis_id = f"d-{secrets.token_hex(8)}"
-    values = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": moments.next_of(connection, skin_ids)}
+    values = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": times.next_of(connection, skin_ids)}
     connection.execute(insert(diagnoses), {**wanted, **values})
     return find(connection, diagnosis_id)
 

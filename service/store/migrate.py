@@ -11,6 +11,7 @@ from sqlalchemy import Connection, inspect, text
 from service.store import backup, key_requirement
 from service.store.engine import Database
 from service.store.errors import StoreError
+from service.store.tables import metadata
 
 SCRIPTS = Path(__file__).parent / "migrations"
 VERSIONS = sorted(file.name[:4] for file in (SCRIPTS / "versions").glob("[0-9]*.py"))  # oldest first
@@ -25,14 +26,21 @@ def migrate(database: Database, folder: Path) -> None:
         return
     with _one_at_a_time(database, folder):
         before = version(database)
-        if before == VERSIONS[-1]:
-            return
-        if before is not None:
+        if before is None:
+            database.write(_begin)
+        elif before != VERSIONS[-1]:
             require_known(before)
             occasion = f"before-{VERSIONS[-1]}"
             backup.remove_parts(folder, occasion)
             backup.make(database, backup.path_for(database, folder, occasion))
-        _upgrade(database)
+            _upgrade(database)
+
+
+def _begin(connection: Connection) -> None:
+    """Create the newest tables, and note their version as Alembic does."""
+    metadata.create_all(connection)
+    connection.execute(text("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
+    connection.execute(text("INSERT INTO alembic_version VALUES (:newest)"), {"newest": VERSIONS[-1]})
 
 
 def version(database: Database) -> str | None:

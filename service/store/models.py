@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import Connection, Select, func, insert, select, update
 
 from service.store import diagnoses as kept
-from service.store import moments, skins
+from service.store import skins, times
 from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, diagnoses, models
 from service.store.tables import skins as skin_rows
@@ -36,7 +36,7 @@ def adopt(connection: Connection, root: str, diagnosis: AnyRow, adopted_from: st
         "skin_id": root,
         "version": last + 1,
         "diagnosis": diagnosis.number,
-        "adopted_at": moments.next_of(connection, [root]),
+        "adopted_at": times.next_of(connection, [root]),
         "adopted_from": adopted_from,
     }
     connection.execute(insert(models), row)

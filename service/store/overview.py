@@ -1,22 +1,51 @@
-"""Overview of skins: number of campaigns, the latest one, d33 over the last few, and the latest diagnosis."""
+"""Overview of skins: number of campaigns, the latest one, d33 over the last few, and the latest diagnosis; and a mark
+that tells whether anything that a skin's page shows has changed."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
-from sqlalchemy import Connection, and_, case, func, or_, select
+from sqlalchemy import Connection, Select, and_, case, func, or_, select
 
 from service.store import campaigns as kept
 from service.store import diagnoses as kept_diagnoses
 from service.store import inversions
 from service.store import models as adopted_models
 from service.store import skins as kept_skins
-from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnoses, sensor_d33, skins
+from service.store.diagnosed_together import has_one_of
+from service.store.tables import AnyRow, campaigns, changes, diagnosed_campaigns, diagnoses, models, sensor_d33, skins
 from service.store.tables import inversions as derived
 
 _OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision", "recorded_at", "refused")
 _LATELY = 12  # campaigns of a trend
+
+
+def numbers_of(root: str) -> Select[Any]:
+    """Numbers of all campaigns of a skin and of those joined to it."""
+    return select(campaigns.c.number).where(campaigns.c.skin_id.in_(kept_skins.members(root)))
+
+
+def mark(connection: Connection, root: str, table_sha256: str) -> str:
+    """Another one after an arrival, a withdrawal, a correction, an exclusion, a join, a computed d33, a step of a
+    diagnosis, an adoption and any other change that is recorded."""
+    of_skin = campaigns.c.skin_id.in_(kept_skins.members(root))
+    numbers = numbers_of(root)
+    of_campaigns = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
+    queries = (
+        select(func.count(), func.max(campaigns.c.number), func.sum(campaigns.c.revision)).where(of_skin),
+        select(func.count()).select_from(campaigns).join(derived, inversions.fresh(table_sha256)).where(of_skin),
+        select(diagnoses.c.state, func.count(), func.max(diagnoses.c.number))
+        .where(of_campaigns)
+        .group_by(diagnoses.c.state)
+        .order_by(diagnoses.c.state),
+        select(func.count(), func.count(models.c.withdrawn_at)).where(models.c.skin_id.in_(kept_skins.members(root))),
+        select(func.count()).select_from(skins).where(skins.c.root_id == root),
+        select(func.count()).where(changes.c.skin_id.in_(kept_skins.members(root))),
+    )
+    counts = [[tuple(row) for row in connection.execute(query)] for query in queries]
+    return hashlib.sha256(repr(counts).encode()).hexdigest()[:16]
 
 
 @dataclass

@@ -11,7 +11,7 @@ from service.store import skins
 from service.store.diagnosed_together import has_one_of
 from service.store.engine import holds
 from service.store.errors import Conflict
-from service.store.skin_changes import numbers_of
+from service.store.overview import numbers_of
 from service.store.tables import AnyRow, campaigns, diagnoses, models, recordings
 from service.store.tables import skins as skin_rows
 from service.store.times import now
@@ -121,7 +121,7 @@ def _built_since(connection: Connection, change: AnyRow) -> str | None:
 
 def _built_on(connection: Connection, change: AnyRow, root: str) -> str | None:
     """What was built since on a skin and all that count as it, or on the changed campaign; times are in order of
-    creation (moments.py)."""
+    creation (times.py)."""
     numbers = numbers_of(root)
     of_skin = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
     if change.campaign_id is not None:

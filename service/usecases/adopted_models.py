@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +15,16 @@ from service.store import AnyRow, Conflict, Database, diagnoses, models, skins
 from service.usecases.mechanisms import catalogue
 from underskin.errors import conflicting, out_of_range, required
 from underskin.physics.charge_response import gain
+from underskin.prediction.adopted_model import AdoptedModel, adopted
 from underskin.prediction.answers import limits_of_pressed, pressed
 from underskin.prediction.pressed_skin import NOT_FINITE, Transmission, Words
 from underskin.recordings.campaign import frf_conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, Mask, finite, non_negative
 
-# Imported where it is needed: signal processing takes a second to load, which a start need not wait for.
-if TYPE_CHECKING:
-    from underskin.prediction.adopted_model import AdoptedModel
-
 _LARGEST_LINES = 100_000  # distinct rows times frequencies: some seconds
 _MOST_CACHED = 100
-_cache: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
+_cache: dict[str, AdoptedModel] = {}  # by diagnosis, which do not change once done
 _ANY_LINE = np.array([1.0])
 _OUTSIDE = "outside the tables, or the range of the law, by the adopted model"
 _Responses = tuple[Complexes, NDArray[np.bool_]]
@@ -38,7 +34,7 @@ _Responses = tuple[Complexes, NDArray[np.bool_]]
 class ModelInForce:
     """The model in force of a skin, and its id."""
 
-    model: "AdoptedModel"
+    model: AdoptedModel
     model_id: str
 
 
@@ -58,10 +54,8 @@ def model_in_force(store: Database, skin_id: str) -> ModelInForce:
         return ModelInForce(of_row(connection, row), row.model_id)
 
 
-def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
+def of_row(connection: Connection, row: AnyRow) -> AdoptedModel:
     """The model of a finished diagnosis; raises InvalidInput if it cannot be used as a model."""
-    from underskin.prediction.adopted_model import adopted
-
     model = _cache.get(row.id)
     if model is None:
         report = diagnoses.report_of(connection, row.number)
@@ -194,7 +188,7 @@ def _distinct_columns(request: PressedSkinColumns, given: Mapping[str, Floats]) 
 
 
 def _response(
-    model: "AdoptedModel",
+    model: AdoptedModel,
     request: PressedSkinColumns,
     table: SigmaTable,
     rows: Mapping[str, Floats],

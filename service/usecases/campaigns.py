@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 
 from service.schemas.campaigns import CampaignDetail, CampaignEntry, RecordingEntry, RecordingResult
 from service.store import AnyRow, Database, campaigns, codec, undo
-from service.usecases import annotations, d33_cache
+from service.usecases import changes, d33_cache
 from underskin.recordings.campaign import to_dict
 from underskin.recordings.readers import hdf5_file
 from underskin.surrogate.sigma_table import SigmaTable
@@ -18,7 +18,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 def entry(row: AnyRow) -> dict[str, Any]:
     """The fields of CampaignEntry from a row of the store."""
     names = set(CampaignEntry.model_fields) - {"state", "file", "tags"}
-    fields = {"state": campaigns.state(row), "file": row.source, "tags": annotations.words(row.tags)}
+    fields = {"state": campaigns.state(row), "file": row.source, "tags": changes.words(row.tags)}
     return {name: getattr(row, name) for name in names} | fields
 
 

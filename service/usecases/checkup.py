@@ -8,9 +8,11 @@ import shutil
 import sqlite3
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from datetime import UTC, datetime
+from enum import IntEnum
 from pathlib import Path
 
 from sqlalchemy import ColumnElement, Connection, func, select
@@ -20,20 +22,105 @@ from service.auth.access_control import LOOPBACK_NAMES
 from service.auth.keys import KeyStore, KeysUnreadable
 from service.log import first_line
 from service.settings import Settings, unknown_settings
-from service.store import Database, StoreError, StoreMoved, database, diagnoses, key_requirement, migrate
+from service.store import Database, StoreError, StoreMoved, backup, database, diagnoses, key_requirement, migrate
 from service.store.engine import SQLITE_FILE
 from service.store.tables import campaigns
 from service.store.tables import diagnoses as queue
-from service.usecases.checkup_backups import of_backups
-from service.usecases.observation import FILES_OPEN, Level, Observation, carried_out, open_to_others
-from service.usecases.scheduled_backups import newest
+from service.usecases.scheduled_backups import OWNER, SKEW_S, foreign, newest, stored_backups
 from underskin import TableError
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
+FILES_OPEN = "see that the disk answers, and that this user is the one that runs the server"
 _LITTLE_MB, _TOO_LITTLE_MB = 2000, 200
 _SKEW_S = 5.0  # of two clocks
 _DATABASE = "see whether the database runs, and its address in UNDERSKIN_DATABASE_URL"
 _WAITS_S = 300.0  # a diagnosis in the queue
+
+
+class Level(IntEnum):
+    """Severity as in monitoring systems: the exit status of the worst finding."""
+
+    OK = 0
+    WARNING = 1
+    CRITICAL = 2
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What a check found, in words, and what to do where that is anything."""
+
+    check: str
+    level: Level
+    found: str
+    advice: str = ""
+
+
+def carried_out(check: str, observations: Iterator[Observation]) -> Iterator[Observation]:
+    """The findings of a check, and one more if a disk or file error ends it early."""
+    try:
+        yield from observations
+    except OSError as error:
+        yield Observation(check, Level.CRITICAL, f"cannot be looked at: {first_line(error)}", FILES_OPEN)
+
+
+def open_to_others(check: str, folders: Sequence[Path]) -> Iterator[Observation]:
+    """Files in these folders that others than their owner may read or write."""
+    files = [path for folder in folders for path in sorted(folder.glob("*")) if path.is_file()]
+    open_paths = [str(path) for path in files if stat.S_IMODE(path.stat().st_mode) & 0o077]
+    if open_paths:
+        more = f" and {len(open_paths) - 3} more" if len(open_paths) > 3 else ""
+        message = f"others than their owner may open {', '.join(open_paths[:3])}{more}"
+        yield Observation(check, Level.WARNING, message, "chmod 600 these files")
+
+
+def of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
+    """One finding or more."""
+    if settings.backup_to is None:
+        yield Observation("backups", Level.WARNING, "the server makes none by itself",
+                      "set UNDERSKIN_BACKUP_TO, or see that `underskin backup FILE` runs every day")  # fmt: skip
+        return
+    try:
+        words = foreign(store, settings.backup_to)
+    except (DBAPIError, StoreError, StoreMoved, OSError):
+        words = ""
+        yield Observation("backups", Level.WARNING, f"of which store those in {settings.backup_to} are is unknown",
+                          "see to the store first")  # fmt: skip
+    if words:
+        yield Observation("backups", Level.CRITICAL, f"{words}, and the server makes none there",
+                          "set UNDERSKIN_BACKUP_TO to a folder of its own; if it is this store after all, "
+                          f"delete {settings.backup_to / OWNER}")  # fmt: skip
+        return
+    yield from open_to_others("backups", [settings.backup_to])
+    ahead = [copy for copy in stored_backups(settings.backup_to) if copy.age_s < -SKEW_S]
+    if ahead:
+        yield Observation("backups", Level.WARNING, f"{ahead[0].path.name} is dated ahead of this machine's clock",
+                      "set the clock, and rename or delete what a wrong one dated")  # fmt: skip
+    last = newest(settings.backup_to)
+    if last is None:
+        yield Observation("backups", Level.CRITICAL, f"there is none in {settings.backup_to}",
+                      "see that its disk is mounted and a server runs; its log says why it makes none")  # fmt: skip
+        return
+    hours = last.age_s / 3600
+    if hours > 2 * settings.backup_every:
+        yield Observation("backups", Level.CRITICAL, f"the newest, {last.path.name}, is {hours:.0f} hours old",
+                      "see that the server runs; its log says why none can be made")  # fmt: skip
+        return
+    try:
+        backup.verify(store, last.path)
+    except (StoreError, OSError) as error:
+        yield Observation("backups", Level.CRITICAL, str(error),
+                      "see that it is of this store and its disk is sound; then `underskin backup FILE`")  # fmt: skip
+        return
+    if (count := len(stored_backups(settings.backup_to))) > settings.backup_keep + 1:
+        yield Observation("backups", Level.WARNING, f"{count} are kept, more than UNDERSKIN_BACKUP_KEEP = "
+                          f"{settings.backup_keep}: none is deleted while the newest is far smaller than the largest",
+                          "see whether the store lacks anything; if not, delete the larger ones")  # fmt: skip
+    addition = ", on the disk of the store itself" if _on_one_disk(settings.data, settings.backup_to) else ""
+    yield Observation("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole{addition}")
+
+
+def _on_one_disk(*folders: Path) -> bool:
+    return len({folder.stat().st_dev for folder in folders if folder.is_dir()}) == 1
 
 
 def examine(settings: Settings) -> Iterator[Observation]:

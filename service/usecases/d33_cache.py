@@ -1,33 +1,33 @@
 """d33 of stored campaigns, computed once for each state of a campaign and cached in the store."""
 
-import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
+import numpy as np
 import orjson
 from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
+from service.log import logger
 from service.problems import Refusal
-from service.schemas.campaign_d33 import D33
+from service.schemas.campaign_d33 import D33, D33Value
 from service.store import AnyRow, Conflict, Database, StorageFailed, StoreMoved, campaigns, inversions
 from service.usecases import figure_data
 from service.usecases.adopted_models import ModelInForce, model_in_force
-from service.usecases.campaign_d33 import of_array, of_inversion, of_moduli
 from underskin import InvalidInput, TableError
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import left_out_lines
+from underskin.inversion import elastomer
+from underskin.inversion.elastomer import RecordingModulus
+from underskin.inversion.invert import Inversion, array_d33_by_other, invert
+from underskin.inversion.mixed_model import Estimate
+from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
-
-if TYPE_CHECKING:
-    from underskin.inversion.invert import Inversion
-
-logger = logging.getLogger("underskin")
+from underskin.units import to_lab
 
 BandHz = tuple[float, float]
-
 _MOST_NAMED = 3  # reasons for which recordings give no d33
 _PAPER = {"model": "paper", "model_id": None, "model_percent": None}
 _NONE: dict[str, Any] = {
@@ -41,6 +41,93 @@ _NONE: dict[str, Any] = {
     "cells": [],
     "findings": [],
 }
+
+
+def of_inversion(inversion: Inversion) -> dict[str, Any]:
+    """The fields of `D33` that come from an inversion."""
+    zone, cells = inversion.zone, inversion.cells
+    array, relative = inversion.absolute_d33, inversion.campaign_d33
+
+    radii = to_lab("indenter_radius_mm", cells.indenter_radius).tolist()
+    return {
+        "status": "ok",
+        "reason": None,
+        "band": {
+            "low_hz": float(zone.low_hz),
+            "high_hz": float(zone.high_hz),
+            "reason": zone.reason,
+            "chosen_by_user": zone.chosen_by_user,
+            "left_out_hz": [float(line) for line in zone.left_out_hz],
+        },
+        "array": of_array(array),
+        "array_relative": of_array(relative),
+        "array_solved": None,
+        "sensor_spread_percent": _scatter(inversion.spread, 100.0),
+        "gain_scatter_percent": _scatter(inversion.gain, 100.0),
+        "position_scatter_mm": _scatter(inversion.position, 1e3),
+        "declared_percent": _finite(inversion.declared_percent),
+        "sensors": [
+            {"sensor": name, "flags": _flags(inversion, name), **d33}
+            for name, d33 in zip(inversion.sensor_ids, _d33(inversion.sensors), strict=True)
+        ],
+        "cells": [
+            {
+                "sensor": inversion.sensor_ids[sensor],
+                "indenter_radius_mm": round(radius, 9),
+                "preload_n": preload,
+                "recordings": count,
+                **d33,
+            }
+            for sensor, radius, preload, count, d33 in zip(
+                cells.sensor.tolist(), radii, cells.preload.tolist(), cells.recordings.tolist(), _d33(cells.d33),
+                strict=True,
+            )
+        ],
+        "findings": [finding.sentence for finding in inversion.findings],
+    }  # fmt: skip
+
+
+def of_array(estimate: Estimate | None) -> dict[str, float | None] | None:
+    """The fields of `D33Value` of one d33."""
+    return None if estimate is None else _d33(estimate)[0]
+
+
+def of_moduli(recordings: Sequence[RecordingModulus]) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+    """The entries of `moduli`, and those of `left_out` for recordings without one."""
+    moduli, excluded = [], []
+    for recording in recordings:
+        if isinstance(recording.result, InvalidInput):
+            excluded.append({"recording": recording.recording, "reason": str(recording.result)})
+            continue
+        moduli.append(
+            {
+                "recording": recording.recording,
+                "kind": recording.kind,
+                "youngs_modulus_mpa": float(to_lab("youngs_modulus_mpa", recording.result.modulus)),
+                "youngs_modulus_uncertainty_mpa": float(to_lab("youngs_modulus_mpa", recording.result.uncertainty)),
+                "statement": recording.result.statement,
+            }
+        )
+    return moduli, excluded
+
+
+def _d33(estimate: Estimate) -> list[dict[str, float | None]]:
+    """The fields of `D33Value` of each entry."""
+    return [dict(zip(D33Value.model_fields, map(_finite, row), strict=True)) for row in estimate.d33_rows()]
+
+
+def _scatter(estimate: Estimate | None, factor: float) -> dict[str, float] | None:
+    if estimate is None:
+        return None
+    return {name: factor * float(getattr(estimate, name)) for name in ("value", "low", "high")}
+
+
+def _flags(inversion: Inversion, sensor: str) -> list[dict[str, str]]:
+    return [{"code": flag.code, "reason": flag.reason} for flag in inversion.flags if flag.sensor == sensor]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def answer(
@@ -205,7 +292,7 @@ def _computed(
     table: SigmaTable,
     band_hz: BandHz | None,
     excluded: Sequence[tuple[str, str]],
-) -> "tuple[dict[str, Any], Inversion | None, bool]":
+) -> tuple[dict[str, Any], Inversion | None, bool]:
     """The document with the campaign's figures, its inversion if there is one, and whether the computation failed;
     `excluded`: recordings with reasons.
 
@@ -225,14 +312,7 @@ def _computed(
     return full_document, inversion, False
 
 
-def _inverted(
-    campaign: Campaign, table: SigmaTable, band_hz: BandHz | None
-) -> "tuple[dict[str, Any], Inversion | None]":
-    # Imported here: statistics take half a second to load, which a start need not wait for.
-    from underskin.inversion import elastomer
-    from underskin.inversion.invert import invert
-    from underskin.recordings import plausibility
-
+def _inverted(campaign: Campaign, table: SigmaTable, band_hz: BandHz | None) -> tuple[dict[str, Any], Inversion | None]:
     moduli, without_modulus = of_moduli(elastomer.of_campaign(campaign))
     try:
         inversion = invert(campaign, table, band_hz)
@@ -251,10 +331,8 @@ def _inverted(
     return {**of_inversion(inversion), "moduli": moduli, "left_out": excluded + without_modulus}, inversion
 
 
-def _array_solved(campaign: Campaign, table: SigmaTable, inversion: "Inversion") -> dict[str, float | None] | None:
+def _array_solved(campaign: Campaign, table: SigmaTable, inversion: Inversion) -> dict[str, float | None] | None:
     """The field of `D33`; also null if the contact table cannot be read, which is logged."""
-    from underskin.inversion.invert import array_d33_by_other
-
     try:
         return of_array(array_d33_by_other(campaign, table, inversion))
     except TableError as error:

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignRequest, ResponseAnswer, SweepAnswer
-from service.usecases.tables import requested_contact
 from underskin import Indenter, Skin
 from underskin.errors import out_of_range
 from underskin.physics.charge_response import INCOMPRESSIBLE
@@ -13,6 +12,7 @@ from underskin.prediction.answers import OTHER, STATED, limits_of_pressed
 from underskin.prediction.pressed_skin import transmission
 from underskin.prediction.skin_design import Design, design
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.solved_contact import contact_model
 from underskin.units import checked, to_lab
 
 
@@ -20,7 +20,7 @@ def design_of(table: SigmaTable, request: DesignRequest) -> Design:
     """The design that is asked for; raises InvalidInput."""
     skin, indenter, preload = _pressed(request)
     require_apart(request.pitch_mm, request.sensor_radius_mm)
-    contact = requested_contact(table, request.contact)
+    contact = contact_model(table, request.contact)
     return design(contact, skin, indenter, preload, request.pitch_mm * 1e-3, request.dip_percent / 100)
 
 
@@ -35,7 +35,7 @@ def other_sigma(table: SigmaTable, request: DesignRequest, answer: DesignAnswer)
     """σ by the other contact model, where it differs by more than 1 %; None elsewhere."""
     if answer.sigma is None:
         return None
-    sigma = float(transmission(requested_contact(table, OTHER[request.contact]), *_pressed(request)).sigma)
+    sigma = float(transmission(contact_model(table, OTHER[request.contact]), *_pressed(request)).sigma)
     return sigma if abs(sigma / answer.sigma - 1) > STATED else None
 
 
@@ -50,15 +50,15 @@ def design_answer(table: SigmaTable, request: DesignRequest, designed: Design) -
     """A design in lab units."""
     contact, resolution = designed.contact, designed.resolution
     values = {"preload_n": np.array(request.preload_n), "poisson_ratio": np.array(INCOMPRESSIBLE)}
-    contact_model = requested_contact(table, request.contact)
-    limits = limits_of_pressed(contact_model, contact, values, contact.inside, 1)
+    used = contact_model(table, request.contact)
+    limits = limits_of_pressed(used, contact, values, contact.inside, 1)
     frf = None
     if request.d33_pc_per_n is not None:
         d33 = checked("d33_pc_per_n", request.d33_pc_per_n, units_checked=request.units_checked)
         frf = _number(to_lab("frf_pc_per_n", contact.frf(d33)))
     return DesignAnswer(
-        contact=contact_model.name,
-        table_sha256=contact_model.sha256,
+        contact=used.name,
+        table_sha256=used.sha256,
         limit=None if limits is None else limits[0],
         status="ok" if bool(contact.inside) else "out_of_domain",
         contact_radius_mm=float(to_lab("contact_radius_mm", contact.contact_radius)),

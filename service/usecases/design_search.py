@@ -4,6 +4,12 @@ The requirement is the two-point separation of `POST /v1/design`: the distance f
 for every position of the row of sensors. The contacts are with the layer itself (`solved`). A thin layer spreads the
 stress less and a fine pitch samples it more densely; a sensor cannot be wider than the pitch, and two contacts cannot
 be nearer than touching.
+
+Two contacts show as two if a sensor between two others reads less than both, by `dip` times the reading above a sensor,
+for every position of the row of sensors and from that distance on (`underskin.prediction.skin_design`); it is evaluated
+on few placements and distances, in order to search many designs. The pitch cannot exceed half the distance: if the
+middle between the contacts lies midway between two sensors, each of these is nearer to its contact than the sensor
+beyond it and reads more, so that there is no dip.
 """
 
 from collections.abc import Sequence
@@ -14,22 +20,56 @@ import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
-from service.usecases.tables import requested_contact
-from service.usecases.two_point import largest_pitch
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
-from underskin.prediction.skin_design import resolution
+from underskin.prediction.skin_design import are_resolved, resolution
 from underskin.surrogate.off_centre_sigma import sigma_off_centre
 from underskin.surrogate.sigma_table import ContactModel, ContactName, SigmaTable
+from underskin.surrogate.solved_contact import contact_model
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
+_PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
+_DISTANCES = 16
+_BISECTIONS = 7
 THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # the search range, within the table
 _THICKNESSES, _RADII = 8, 6
 _CONTACT: ContactName = "solved"
 NEARLY = 0.95  # of the largest pitch: nearly as few sensors
 _INSIDE = 1.0001  # times the thinnest layer of the table
+
 # Beyond what it misses by, by how much at most in a step, and how often, a pitch is reduced until it meets the demand.
 _FINER, _STEP, _TIMES = 0.995, 0.95, 8
+
+
+def largest_pitch(offset: Floats, response: Floats, distance: float, finest: float, dip: float) -> float:
+    """The largest pitch [m], from `finest` on, at which two contacts are told apart from `distance` [m] on; NaN where
+    they are not even at `finest`.
+
+    Parameters
+    ----------
+    offset, response
+        (n,) distance of a contact from the sensor's centre [m], from 0 on, and the response there [-].
+    dip
+        Over the response above a sensor [-].
+    """
+    if finest > distance / 2 or not _are_all_resolved(offset, response, finest, distance, dip):
+        return float("nan")
+    low, high = finest, distance / 2
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        if _are_all_resolved(offset, response, middle, distance, dip):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _are_all_resolved(offset: Floats, response: Floats, pitch: float, distance: float, dip: float) -> bool:
+    """Whether two contacts show as two at this and every larger distance, for every placement of the row."""
+    width = 2 * float(offset[int(np.argmax(response < response[0] / 2))])
+    farthest = distance + 2 * pitch + 2 * width  # beyond it each contact is seen on its own, again and again
+    distances = np.linspace(distance, farthest, _DISTANCES)
+    return bool(are_resolved(offset, response, pitch, distances, _PLACEMENTS, dip).all())
 
 
 @dataclass(frozen=True)
@@ -83,29 +123,29 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     force = float(checked("preload_n", demand.preload_n))
     d33 = float(checked("d33_pc_per_n", demand.d33_pc_per_n))
     any_skin = Skin.from_lab(thickness_mm=1.0, youngs_modulus_mpa=demand.youngs_modulus_mpa, sensor_radius_mm=1.0)
-    contact_model = requested_contact(table, _CONTACT)
-    thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * _thinnest_mm(contact_model, any_skin, indenter, force)))
+    used = contact_model(table, _CONTACT)
+    thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * _thinnest_mm(used, any_skin, indenter, force)))
     thickness = _steps(thinnest, max(demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
     radii = _steps(RADIUS_MM[0], max(0.28 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
     h, radius = np.meshgrid(to_si("thickness_mm", thickness), to_si("sensor_radius_mm", radii))
     skin = Skin(h, any_skin.youngs_modulus, radius, any_skin.poisson_ratio)
-    reached = transmission(contact_model, skin, indenter, force)
+    reached = transmission(used, skin, indenter, force)
     contact = to_lab("contact_radius_mm", reached.contact_radius[0])
     numbers = reached.small_strain_a_over_h, reached.rt_over_h, reached.load_parameter
     apart = (2 * contact <= demand.resolution_mm) & (4 * radii[:, None] <= demand.resolution_mm)
     pitch = np.full(h.shape, np.nan)
     for index in zip(*np.nonzero(reached.inside & apart), strict=True):
-        offset, response = sigma_off_centre(contact_model, *(float(part[index]) for part in numbers))
+        offset, response = sigma_off_centre(used, *(float(part[index]) for part in numbers))
         if np.isfinite(response).all():
             finest, touching = 2 * float(radii[index[0]]), float(contact[index[1]])
             pitch[index] = _largest_pitch_mm(offset * float(h[index]), response, finest, touching, demand)
     return Region(contact, thickness, radii, pitch, np.asarray(to_lab("frf_pc_per_n", reached.frf(d33))))
 
 
-def _thinnest_mm(contact_model: ContactModel, skin: Skin, indenter: Indenter, force: float) -> float:
+def _thinnest_mm(contact: ContactModel, skin: Skin, indenter: Indenter, force: float) -> float:
     """The thickness at which a/h is the largest of the table."""
-    most = np.array(contact_model.domain["a_over_h"][1])
-    over_cube, _ = contact_model.load_over_cube(most)
+    most = np.array(contact.domain["a_over_h"][1])
+    over_cube, _ = contact.load_over_cube(most)
     plane_modulus = skin.youngs_modulus / (1 - skin.poisson_ratio**2)
     return float(to_lab("thickness_mm", np.cbrt(force * indenter.radius / (plane_modulus * over_cube * most**3))))
 

@@ -3,25 +3,26 @@ its recordings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from underskin import InvalidInput
+from underskin.figures.campaign_figures import model_frf
+from underskin.inversion.invert import Inversion
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.frf import thinned_lines
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.spectra import Frf
+from underskin.recordings.frf.thinned_lines import FrfSpread
 from underskin.units import to_lab
-
-if TYPE_CHECKING:
-    from underskin.inversion.invert import Inversion
-    from underskin.recordings.frf.spectra import Frf
-    from underskin.recordings.frf.thinned_lines import FrfSpread
 
 MOST_SINGLE = 48  # recordings whose lines are drawn one by one, from the recordings
 _RANGES = ("magnitude_pc_per_n", "phase_deg", "coherence")
 
 
 def numbers(
-    campaign: Campaign, inversion: "Inversion | None", known_spreads: list[dict[str, Any]] | None = None
+    campaign: Campaign, inversion: Inversion | None, known_spreads: list[dict[str, Any]] | None = None
 ) -> dict[str, Any]:
     """`recordings`: columns of FRF against preload; `spreads`: FRFs of equal recordings over all lines, independent
     of the band and therefore possibly `known_spreads`; None if they are few."""
@@ -34,11 +35,9 @@ def numbers(
     }
 
 
-def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, "Frf"]]:
+def measured(campaign: Campaign, show: str = "") -> list[tuple[FrfRecording, Frf]]:
     """The FRF recordings that have an FRF, optionally only the one called `show` or those of the sensor of that
     name."""
-    from underskin.recordings.frf.estimation import lines_of
-
     pairs = []
     for recording in campaign.of(FrfRecording):
         if show in ("", recording.sensor, recording.id):
@@ -64,10 +63,8 @@ def frf_columns(campaign: Campaign, show: str = "") -> dict[str, list[Any]]:
     return columns
 
 
-def spreads(cached: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
+def spreads(cached: Sequence[Mapping[str, Any]]) -> list[FrfSpread]:
     """Those of `numbers` again."""
-    from underskin.recordings.frf.thinned_lines import FrfSpread
-
     return [
         FrfSpread(
             **{
@@ -80,10 +77,8 @@ def spreads(cached: Sequence[Mapping[str, Any]]) -> "list[FrfSpread]":
     ]
 
 
-def _preload_columns(campaign: Campaign, inversion: "Inversion") -> dict[str, list[Any]]:
+def _preload_columns(campaign: Campaign, inversion: Inversion) -> dict[str, list[Any]]:
     """FRF in the flat zone against preload, a row a recording."""
-    from underskin.figures.campaign_figures import model_frf
-
     rows = inversion.recordings
     return {
         "recording": list(rows.ids),
@@ -96,14 +91,12 @@ def _preload_columns(campaign: Campaign, inversion: "Inversion") -> dict[str, li
     }
 
 
-def spreads_of(measured_frfs: "Sequence[tuple[FrfRecording, Frf]]") -> "list[FrfSpread]":
+def spreads_of(measured_frfs: Sequence[tuple[FrfRecording, Frf]]) -> list[FrfSpread]:
     """FRFs of recordings alike."""
-    from underskin.recordings.frf import thinned_lines
-
     conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording, _ in measured_frfs]
     return thinned_lines.spreads([frf for _, frf in measured_frfs], conditions)
 
 
-def _plain(spread: "FrfSpread") -> dict[str, Any]:
+def _plain(spread: FrfSpread) -> dict[str, Any]:
     ranges = {name: [values.tolist() for values in getattr(spread, name)] for name in _RANGES}
     return {**asdict(spread), "frequency_hz": spread.frequency_hz.tolist(), **ranges}

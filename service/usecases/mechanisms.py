@@ -1,25 +1,109 @@
 """The catalogue of mechanisms including the lab's own: files (`mechanism/1`) in the folder of UNDERSKIN_MECHANISMS."""
 
+import os
+import tempfile
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
 from sqlalchemy import Connection
 
+from service import durable
 from service.problems import Refusal
 from service.schemas.mechanisms import MechanismEntry, MechanismParameter, UnusableFile
-from service.store import diagnoses, models
-from service.usecases import mechanism_files
+from service.store import diagnoses, models, own_mechanisms
+from service.store.times import now
 from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.declared import saving
-from underskin.mechanisms.declared.document import checked, digest
+from underskin.mechanisms.declared.document import FOLDER, checked, digest, parse
 from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.registry import CATALOGUE
 
+_SET_ASIDE = "discarded"  # a folder next to the files that is not read
 _lock = threading.Lock()  # of what this process has loaded
 _loaded = {"digest": digest()}
+
+
+@dataclass(frozen=True)
+class PutBack:
+    """Names of a backup's files that the folder lacked, and of those that replaced others, which were set aside."""
+
+    written: tuple[str, ...]
+    replaced: tuple[str, ...]
+
+
+def folder_of_lab() -> Path:
+    """The folder; raises Refusal 409 where the server has none."""
+    if not os.environ.get(FOLDER):
+        raise Refusal(409, f"This server has no folder for a lab's own mechanisms: set {FOLDER} and start it again.")
+    return Path(os.environ[FOLDER])
+
+
+def write_file(file: Path, content: bytes) -> None:
+    """Write a file atomically; raises FileExistsError if it exists."""
+    durable.make_folder(file.parent)
+    with tempfile.NamedTemporaryFile(dir=file.parent, prefix=".new-") as new:
+        new.write(content)
+        new.flush()
+        os.fsync(new.fileno())
+        os.link(new.name, file)
+    durable.keep_entries(file.parent)
+
+
+def set_aside(file: Path) -> None:
+    """Move a file to a folder that is not read."""
+    aside = file.parent / _SET_ASIDE
+    aside.mkdir(exist_ok=True)
+    file.rename(aside / f"{file.stem} {now().replace(':', '')}.yaml")
+    durable.keep_entries(aside)
+    durable.keep_entries(file.parent)
+
+
+def of_mechanism(name: str) -> list[Path]:
+    """The files that declare a mechanism of this name."""
+    return [file for file, content in _present_files().items() if _name_in(content) == name]
+
+
+def remember_files(connection: Connection) -> None:
+    """Store the present files in the store, so that backups contain them."""
+    folder = folder_of_lab()
+    if folder.is_dir():  # else those of the last backup stay
+        own_mechanisms.replace(connection, {file.name: content for file, content in _present_files().items()})
+
+
+def put_back_files(connection: Connection) -> PutBack:
+    """Restore the stored files to the folder; a file that differs, or declares the same mechanism, is set aside."""
+    stored, folder = own_mechanisms.found(connection), folder_of_lab()
+    written: list[str] = []
+    replaced: list[str] = []
+    for name, content in stored.items():
+        if Path(name).name != name or not name.endswith(".yaml"):  # in no backup that this service made
+            continue
+        present = _present_files()
+        if present.get(folder / name) == content:
+            continue
+        rivals = [file for file, other in present.items() if file.name == name or _name_in(other) == _name_in(content)]
+        for file in rivals:
+            set_aside(file)
+        write_file(folder / name, content)
+        (replaced if rivals else written).append(name)
+    return PutBack(tuple(written), tuple(replaced))
+
+
+def _present_files() -> dict[Path, bytes]:
+    """The files of the folder, in the order of their names."""
+    return {file: file.read_bytes() for file in sorted(folder_of_lab().glob("*.yaml")) if file.is_file()}
+
+
+def _name_in(content: bytes) -> str | bytes:
+    """Its name; of what cannot be read its content, which is that of no other."""
+    try:
+        return parse(content, "").name
+    except FileError:
+        return content
 
 
 def catalogue() -> Mapping[str, Mechanism]:
@@ -63,14 +147,14 @@ def keep(content: bytes) -> MechanismEntry:
 
     Raises FileError for an invalid document, and Refusal 409 for a name in use.
     """
-    folder = mechanism_files.folder_of_lab()
+    folder = folder_of_lab()
     mechanism = checked(content, "", in_sandbox=True)
     file = folder / f"{mechanism.name}.yaml"
     new_entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
     if mechanism.name in catalogue():
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.")
     try:
-        mechanism_files.write(file, content)
+        write_file(file, content)
     except FileExistsError:
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.") from None
     return new_entry
@@ -106,8 +190,8 @@ def discard(connection: Connection, name: str) -> MechanismEntry:
         if report is not None and name in {reported["name"] for reported in report["mechanisms"]}:
             raise Refusal(409, f"The model in force of skin {row.model_skin_id!r} needs {name!r}: withdraw it first.")
     discarded = _entry(mechanism, CATALOGUE.packages.get(name))
-    for file in mechanism_files.of_mechanism(name):
-        mechanism_files.set_aside(file)
+    for file in of_mechanism(name):
+        set_aside(file)
     catalogue()
     return discarded
 

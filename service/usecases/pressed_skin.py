@@ -10,13 +10,13 @@ from service.schemas.columns import Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
 from service.usecases.adopted_models import press, requested_model, require_paper
-from service.usecases.tables import requested_contact
 from underskin.errors import ErrorCode, InvalidInput, SeveralInvalid, conflicting, out_of_range, required
 from underskin.physics import charge_response
 from underskin.prediction import answers
 from underskin.prediction.columns import rows
 from underskin.recordings import plausibility
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.solved_contact import contact_model
 from underskin.units import Complexes, Floats, checked, finite, non_negative, to_lab
 
 # A spectrum a row multiplies the answer; this is some 20 MB of JSON.
@@ -29,7 +29,7 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     if request.model == "adopted":
         return _adopted_frf(table, store, request)
     require_paper(request)
-    contact = requested_contact(table, request.contact)
+    contact = contact_model(table, request.contact)
     columns = _sent(request, *FIELDS, "d33_pc_per_n")
     count = rows(columns)
     with _all_refused(columns, request.units_checked):
@@ -98,7 +98,7 @@ def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     if request.model == "adopted":
         return _adopted_d33(table, store, request)
     require_paper(request)
-    contact = requested_contact(table, request.contact)
+    contact = contact_model(table, request.contact)
     measured = _plateau(request) if request.frf_pc_per_n is None else _values(request)
     columns = _sent(request, *FIELDS) | measured
     count = _rows(request, columns)

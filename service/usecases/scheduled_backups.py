@@ -8,7 +8,6 @@ or gone, its disk is missing: none is made in its place, also after a restart, b
 """
 
 import fcntl
-import logging
 import math
 import os
 import re
@@ -23,11 +22,9 @@ from pathlib import Path
 from prometheus_client import Counter, Gauge
 
 from service import durable
-from service.log import first_line
+from service.log import first_line, logger
 from service.store import Database, StorageFailed, StoreError, backup, identity
-from service.usecases import mechanism_files
-
-logger = logging.getLogger("underskin")
+from service.usecases import mechanisms
 
 _PREFIX, _STAMP = "underskin-", "%Y%m%dT%H%M%SZ"
 _NAME = re.compile(rf"{_PREFIX}(\d{{8}}T\d{{6}}Z)\.(?:sqlite3|pgdump)")
@@ -173,7 +170,7 @@ class ScheduledBackups:
             suffix = ".sqlite3" if self._store.is_sqlite else ".pgdump"
             file = self._folder / f"{_PREFIX}{datetime.now(UTC):{_STAMP}}{suffix}"
             try:
-                self._store.write(mechanism_files.remember)
+                self._store.write(mechanisms.remember_files)
             except StorageFailed as error:  # an unwritable disk here must not prevent a backup elsewhere
                 logger.warning("mechanisms of the lab's own are in the backup as they were at the last one: %s", error)
             backup.make(self._store, file)

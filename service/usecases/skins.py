@@ -13,7 +13,7 @@ from service.problems import Refusal
 from service.schemas import skins as models
 from service.schemas.skins import SkinDetail
 from service.store import AnyRow, Database, Missing, campaigns, inversions, skins
-from service.usecases import adopted_models, annotations, d33_cache
+from service.usecases import adopted_models, changes, d33_cache
 from underskin import InvalidInput
 from underskin.errors import conflicting
 from underskin.inversion.array_history import FEWEST, SIGNIFICANT, Trend, array_history, holm, trend
@@ -41,7 +41,7 @@ def join(store: Database, skin_id: str, other: str, reason: str, joined_from: st
 
 def entry(row: AnyRow) -> models.SkinEntry:
     """A row of a list of skins."""
-    tags = annotations.words(row.tags)
+    tags = changes.words(row.tags)
     return models.SkinEntry(id=row.id, created_at=row.created_at, campaigns=row.campaigns, title=row.title, tags=tags)
 
 
@@ -56,7 +56,7 @@ def detail(connection: Connection, skin_id: str) -> SkinDetail:
         created_at=row.created_at,
         title=row.title,
         remark=row.remark,
-        tags=annotations.words(row.tags),
+        tags=changes.words(row.tags),
         discarded_at=row.discarded_at,
         joined=[joined(joined_skin) for joined_skin in joined_skins],
         differences=differences(connection, [row.id, *(joined_skin.id for joined_skin in joined_skins)]),

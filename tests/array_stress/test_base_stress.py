@@ -14,11 +14,8 @@ TABLE = load_influence()
 UNIT_MPA = 1.5 / np.pi / 2.5**2  # of 1 N on 2.5 mm
 
 
-def test_exact_layer_summed_over_loads() -> None:
-    """It is that of the exact layer summed over the loads.
-
-    Point sensors under two small spheres, one of them sheared.
-    """
+def test_it_is_that_of_the_exact_layer_summed_over_the_loads() -> None:
+    """Point sensors under two small spheres, one of them sheared."""
     contacts = [
         {**PRESS, "x_mm": 1.0, "y_mm": 2.0, "normal_force_n": 0.01, "tangential_force_n": [0.006, -0.003]},
         {**PRESS, "x_mm": 6.0, "y_mm": -1.0, "normal_force_n": 0.02},
@@ -37,8 +34,7 @@ def test_exact_layer_summed_over_loads() -> None:
     assert (expected > 0).any()  # the shear pulls somewhere
 
 
-def test_sensor_s_mean_stress_mean_over_disc() -> None:
-    """A sensor s mean stress is the mean over its disc."""
+def test_a_sensors_mean_stress_is_the_mean_over_its_disc() -> None:
     request = read_request(document({**PRESS, "x_mm": 1.0}, {**PRESS, "x_mm": -2.0, "y_mm": 3.0}))
     grid = np.linspace(-1.5, 1.5, 61)
     stress = base_stress(TABLE, request, grid, grid).sigma_zz_mpa

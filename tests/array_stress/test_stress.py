@@ -27,11 +27,8 @@ from underskin.units import Floats
 TABLE = load_influence()
 
 
-def test_centred_sphere_gives_frf_times_force(http: httpx.Client) -> None:
-    """A centred sphere gives the frf times the force.
-
-    In the linear limit, that is at a small force, where /v1/frf leaves finite strain out too.
-    """
+def test_a_centred_sphere_gives_the_frf_times_the_force(http: httpx.Client) -> None:
+    """In the linear limit, that is at a small force, where /v1/frf leaves finite strain out too."""
     small = 0.002
     found = posted(http, document({**PRESS, "normal_force_n": small}))
     columns = {name: SKIN[name] for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "d33_pc_per_n")}
@@ -43,11 +40,8 @@ def test_centred_sphere_gives_frf_times_force(http: httpx.Client) -> None:
     assert found["status"] == ["ok"] * 5
 
 
-def test_charges_exact_layer_whatever_load(http: httpx.Client) -> None:
-    """Charges are those of the exact layer whatever the load.
-
-    Two spheres, sheared, over a compressible layer on a glue line that yields.
-    """
+def test_charges_are_those_of_the_exact_layer_whatever_the_load(http: httpx.Client) -> None:
+    """Two spheres, sheared, over a compressible layer on a glue line that yields."""
     contacts = [
         {**PRESS, "x_mm": 1.0, "y_mm": 2.0, "tangential_force_n": [0.3, -0.2]},
         {**PRESS, "x_mm": 9.0, "y_mm": -1.0, "normal_force_n": 2.0, "tangential_force_n": [-0.5, 0.4]},
@@ -114,11 +108,8 @@ def test_several_contacts_add_up(http: httpx.Client) -> None:
         assert both["charge_pc"][sensor] == pytest.approx(summed, rel=1e-12)
 
 
-def test_soft_thick_skin_half_space_walls(http: httpx.Client) -> None:
-    """A soft thick skin is the half space between the walls.
-
-    The sign of shear is the half space's: the base of a layer feels the same way.
-    """
+def test_a_soft_thick_skin_is_the_half_space_between_the_walls(http: httpx.Client) -> None:
+    """The sign of shear is the half space's: the base of a layer feels the same way."""
     shear = {**PRESS, "x_mm": 11.0, "tangential_force_n": [1.0, 0.0]}
     with_shear, without = (posted(http, document(contact)) for contact in (shear, {**PRESS, "x_mm": 11.0}))
     change = with_shear["mean_stress_mpa"][1] - without["mean_stress_mpa"][1]
@@ -127,8 +118,7 @@ def test_soft_thick_skin_half_space_walls(http: httpx.Client) -> None:
     assert change == pytest.approx(expected, rel=0.5)
 
 
-def test_pressure_map_gives_contact_gives(http: httpx.Client) -> None:
-    """A pressure map gives what its contact gives."""
+def test_a_pressure_map_gives_what_its_contact_gives(http: httpx.Client) -> None:
     x = np.linspace(6.5, 9.5, 61)
     a = np.cbrt(0.75 * 4.0 * 0.75 / 16.0)
     inside = np.clip(1 - ((x - 8.0) ** 2 + (x[:, None] - 8.0) ** 2) / a**2, 0, None)
@@ -140,8 +130,7 @@ def test_pressure_map_gives_contact_gives(http: httpx.Client) -> None:
     assert found["charge_pc"] == pytest.approx(contact["charge_pc"], rel=1e-3)
 
 
-def test_sensors_no_load_reaches_out_domain(http: httpx.Client) -> None:
-    """Only sensors that no load reaches are out of the domain."""
+def test_only_sensors_that_no_load_reaches_are_out_of_the_domain(http: httpx.Client) -> None:
     far = [{"id": "near", "x_mm": 0.0, "y_mm": 0.0}, {"id": "far", "x_mm": 40.0, "y_mm": 0.0}]
     found = posted(http, document({**PRESS, "x_mm": 0.0}, sensors=far))
     assert found["status"] == ["ok", "out_of_domain"]
@@ -165,8 +154,7 @@ def test_csv_has_a_row_a_sensor(http: httpx.Client) -> None:
     assert [line[0] for line in lines] == names
 
 
-def test_client_command_give_services_numbers(http: httpx.Client, server_url: str, tmp_path: Path) -> None:
-    """Client and command give the services numbers."""
+def test_client_and_command_give_the_services_numbers(http: httpx.Client, server_url: str, tmp_path: Path) -> None:
     request = document(PRESS, {**PRESS, "x_mm": 60.0})
     plain = posted(http, request)
     with Client(server_url) as client:
@@ -188,11 +176,8 @@ def test_client_command_give_services_numbers(http: httpx.Client, server_url: st
 
 
 @pytest.mark.slow
-def test_wide_uniform_map_reaches_base_whole() -> None:
-    """A wide uniform map reaches the base whole.
-
-    Three thicknesses inside its edges; 100 × 200 cells over 64 sensors.
-    """
+def test_a_wide_uniform_map_reaches_the_base_whole() -> None:
+    """Three thicknesses inside its edges; 100 × 200 cells over 64 sensors."""
     sensors: list[Document] = [{"id": f"{i}-{j}", "x_mm": 5.0 * i, "y_mm": 2.5 * j} for i in range(8) for j in range(8)]
     x, y = np.linspace(0, 35, 200), np.linspace(0, 17.5, 100)
     request: Document = {**SKIN, "sensors": sensors}
@@ -207,11 +192,8 @@ def test_wide_uniform_map_reaches_base_whole() -> None:
 
 
 @pytest.mark.slow
-def test_huge_map_takes_little_memory_itself() -> None:
-    """A huge map takes little more memory than itself.
-
-    Half a million coarse cells, and twenty million point forces, of which a gigabyte would be needed at once.
-    """
+def test_a_huge_map_takes_little_more_memory_than_itself() -> None:
+    """Half a million coarse cells, and twenty million point forces, of which a gigabyte would be needed at once."""
     x = np.arange(707) * 1.5
     request = read_request(
         {

@@ -16,9 +16,9 @@ from tests.cli.commands import run
 
 def example() -> Document:
     """That of the service, whose modules take long to load."""
-    from service.routes.stress import EXAMPLE
+    from service.routes.computed import STRESS_EXAMPLE
 
-    return deepcopy(EXAMPLE)
+    return deepcopy(STRESS_EXAMPLE)
 
 
 def map_of(**changes: Any) -> Callable[[Document], None]:
@@ -103,8 +103,7 @@ def test_what_cannot_be_is_refused_by_name(
     assert allowed in error["allowed"]
 
 
-def test_map_reach_skins_edge_cells_no_further(http: httpx.Client) -> None:
-    """A map may reach the skins edge with its cells and no further."""
+def test_a_map_may_reach_the_skins_edge_with_its_cells_and_no_further(http: httpx.Client) -> None:
     request = example()  # its sensors' middle is at x 4
     map_of(x_mm=[-14.5, -11.5], y_mm=[-0.5, 0.5], pressure_mpa=[[0.1, 0.0], [0.0, 0.0]])(request)
     assert http.post("/v1/stress", json={**request, "length_mm": 40.0, "width_mm": 2.0}).status_code == 200
@@ -117,8 +116,7 @@ def test_map_reach_skins_edge_cells_no_further(http: httpx.Client) -> None:
         assert "x from -16 to 24 mm (length_mm 40, about the middle of the sensors)" in error["allowed"]
 
 
-def test_nan_refused_batch_too_large_says(http: httpx.Client) -> None:
-    """Nan is refused and a batch too large says so."""
+def test_nan_is_refused_and_a_batch_too_large_says_so(http: httpx.Client) -> None:
     body = json.dumps(document({**PRESS, "x_mm": float("nan")}))
     reply = http.post("/v1/stress", content=body, headers={"Content-Type": "application/json"})
     assert (reply.status_code, reply.json()["errors"][0]["field"]) == (422, "contacts[0].x_mm")

@@ -41,8 +41,7 @@ def test_frf_agrees_with_the_service(server_url: str) -> None:
 
 
 @pytest.mark.slow
-def test_d33_no_sensor_answered_named() -> None:
-    """A d33 that no sensor has is answered and named."""
+def test_a_d33_that_no_sensor_has_is_answered_and_named() -> None:
     for frf, said in (("7400", "more than sensors have"), ("0.0074", "less than sensors have"), ("-7.4", "negative")):
         found = run("d33", *SKIN, "--preload-n", "1", "--frf-pc-per-n", frf)
         assert found.returncode == 0
@@ -50,8 +49,7 @@ def test_d33_no_sensor_answered_named() -> None:
 
 
 @pytest.mark.slow
-def test_d33_takes_back_frf_gave_through_csv() -> None:
-    """D33 takes back what frf gave through csv."""
+def test_d33_takes_back_what_frf_gave_through_csv() -> None:
     frf = columns(*FRF, "--preload-n", "1,3")["frf_pc_per_n"]
     table = f"preload_n,frf_pc_per_n\n1,{frf[0]}\n\n3,{frf[1]}\n"
     back = columns("d33", *SKIN, "--input", "-", "--frf-uncertainty-pc-per-n", "0.074", given=table)
@@ -72,8 +70,7 @@ def test_sigma_of_both_models() -> None:
 
 
 @pytest.mark.slow
-def test_table_shows_units_status_means() -> None:
-    """Table shows units and what a status means."""
+def test_table_shows_units_and_what_a_status_means() -> None:
     shown = run(*FRF, "--preload-n", "1,300").stdout
     for text in (
         "thickness h",
@@ -168,8 +165,7 @@ def test_bad_csv_is_one_line_and_status_2(text: str, says: str) -> None:
 
 
 @pytest.mark.slow
-def test_read_otherwise_headed_left_out_told() -> None:
-    """What is read otherwise than headed or left out is told."""
+def test_what_is_read_otherwise_than_headed_or_left_out_is_told() -> None:
     table = "preload_n,indenter_diameter_mm,frf_pc_per_n\n1,8,7\n\nmeasured by mb, in the cold room\n"
     found = run("d33", *SKIN[:6], "--input", "-", "--csv", given=table)
     assert found.stderr.splitlines() == [
@@ -196,8 +192,7 @@ def test_missing_table_says_what_to_do(tmp_path: Path) -> None:
     assert "sigma.h5 cannot be read: No such file or directory. Restore it" in line
 
 
-def test_help_lists_commands_without_loading() -> None:
-    """Help lists all commands without loading them."""
+def test_help_lists_all_commands_without_loading_them() -> None:
     report = run("--help", PYTHONPROFILEIMPORTTIME="1")
     for command in ("sigma", "frf", "d33", "serve", "key", "tablegen"):
         assert command in report.stdout
@@ -208,8 +203,7 @@ def test_help_lists_commands_without_loading() -> None:
 
 
 @pytest.mark.slow
-def test_commands_packages_get_arguments(tmp_path: Path) -> None:
-    """Commands of other packages get their arguments."""
+def test_commands_of_other_packages_get_their_arguments(tmp_path: Path) -> None:
     made = run("key", "create", "bench-1", UNDERSKIN_DATA=str(tmp_path))
     assert (made.returncode, made.stderr) == (0, "")
     assert "bench-1" in run("key", "list", UNDERSKIN_DATA=str(tmp_path)).stdout
@@ -231,8 +225,7 @@ def test_reader_that_goes_away() -> None:
 
 
 @pytest.mark.slow
-def test_columns_come_sheet_workbook_name(tmp_path: Path) -> None:
-    """Columns come from a sheet of a workbook by its name."""
+def test_columns_come_from_a_sheet_of_a_workbook_by_its_name(tmp_path: Path) -> None:
     book = openpyxl.Workbook()
     book.active.append(["measured by", "mb"])
     sheet = book.create_sheet("Day 2")

@@ -69,8 +69,7 @@ def test_csv_has_the_inversions_numbers(palm: Campaign, file: Path) -> None:
 
 
 @pytest.mark.slow
-def test_table_shows_array_sensors_band_left(palm: Campaign, file: Path) -> None:
-    """The table shows array sensors band and what is left out."""
+def test_the_table_shows_array_sensors_band_and_what_is_left_out(palm: Campaign, file: Path) -> None:
     shown = run("d33", str(file)).stdout
     found = invert(palm, load_table())
     assert f"palm ({file})" in shown
@@ -85,8 +84,7 @@ def test_table_shows_array_sensors_band_left(palm: Campaign, file: Path) -> None
 
 
 @pytest.mark.slow
-def test_unreadable_files_recordings_named(palm: Campaign, tmp_path: Path) -> None:
-    """Unreadable files and recordings are named and the others inverted."""
+def test_unreadable_files_and_recordings_are_named_and_the_others_inverted(palm: Campaign, tmp_path: Path) -> None:
     document = json.loads(json_file.write(palm))
     document["recordings"][3]["preload_n"] = -1
     (tmp_path / "one.json").write_text(json.dumps(document))
@@ -130,8 +128,7 @@ def test_a_campaign_that_tells_nothing_says_why(palm: Campaign, tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_instrument_files_need_rig_tell_modulus(tmp_path: Path) -> None:
-    """Instrument files need a rig and tell the modulus."""
+def test_instrument_files_need_a_rig_and_tell_the_modulus(tmp_path: Path) -> None:
     (tmp_path / "block.csv").write_text(CURVE)
     rig = tmp_path / "rig.yaml"
     text = (EXAMPLES / "rigs" / "silicone-compression.yaml").read_text()
@@ -212,8 +209,7 @@ def test_d33_and_modulus_of_one_campaign(palm: Campaign, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_figures_pages_need_nothing_else(file: Path, tmp_path: Path) -> None:
-    """Figures are pages that need nothing else."""
+def test_figures_are_pages_that_need_nothing_else(file: Path, tmp_path: Path) -> None:
     assert run("d33", str(file), "--figures", str(tmp_path / "new" / "figures")).returncode == 0
     (page,) = (tmp_path / "new" / "figures").iterdir()
     assert page.name == "palm.json.html"
@@ -230,8 +226,7 @@ def test_figures_pages_need_nothing_else(file: Path, tmp_path: Path) -> None:
     assert "sensor s5: weak" in text
 
 
-def test_figures_two_files_name_refused(file: Path, tmp_path: Path) -> None:
-    """Figures of two files of one name are refused."""
+def test_figures_of_two_files_of_one_name_are_refused(file: Path, tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     other = tmp_path / "other" / "palm.json"
     other.write_bytes(file.read_bytes())

@@ -32,8 +32,7 @@ def hertz(file: Path) -> None:
 
 
 @pytest.mark.slow
-def test_raw_curve_diagnosed_rig_description(tmp_path: Path) -> None:
-    """A raw curve is diagnosed with a rig description."""
+def test_a_raw_curve_is_diagnosed_with_a_rig_description(tmp_path: Path) -> None:
     file, rig = tmp_path / "curve.txt", tmp_path / "rig.yaml"
     hertz(file)
     rig.write_text(RIG)

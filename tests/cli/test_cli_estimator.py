@@ -42,8 +42,7 @@ def d33_of_series(output: str) -> float:
 
 
 @pytest.mark.slow
-def test_command_says_counts_file_lines_left(tmp_path: Path) -> None:
-    """What the command says counts for more than the file and lines are left."""
+def test_what_the_command_says_counts_for_more_than_the_file_and_lines_are_left(tmp_path: Path) -> None:
     file = written(tmp_path, "H1")
     by_file, chosen = run("d33", str(file), "--csv"), run("d33", str(file), "--csv", "--estimator", "H2")
     assert (by_file.returncode, chosen.returncode) == (0, 0), chosen.stderr

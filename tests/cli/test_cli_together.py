@@ -40,8 +40,7 @@ def figures(text: str) -> list[dict[str, str]]:
 
 
 @pytest.mark.slow
-def test_files_together_tell_file(palm: Campaign, presses: list[str], tmp_path: Path) -> None:
-    """Files together tell what one file of all would."""
+def test_files_together_tell_what_one_file_of_all_would(palm: Campaign, presses: list[str], tmp_path: Path) -> None:
     (tmp_path / "all.json").write_bytes(json_file.write(palm))
     whole = run("d33", str(tmp_path / "all.json"), "--csv")
     parts = run("d33", *presses, "--together", "palm 3", "--csv")

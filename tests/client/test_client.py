@@ -37,8 +37,7 @@ def test_sigma_is_the_tables(client: Client) -> None:
     assert (answer.model, answer.table_sha256) == ("layer", TABLE.sha256)
 
 
-def test_rows_outside_table_nan_spoil(client: Client) -> None:
-    """Rows outside the table are nan and spoil no other."""
+def test_rows_outside_the_table_are_nan_and_spoil_no_other(client: Client) -> None:
     answer = client.frf(**PRESSED, preload_n=[1.0, 300.0], d33_pc_per_n=14.0)
     assert answer.status.tolist() == ["ok", "out_of_domain"]
     assert answer.limit.tolist() == ["", "L = 1.17 exceeds 0.1: at most 25.6 N"]
@@ -56,8 +55,7 @@ def test_frf_is_the_librarys(client: Client) -> None:
     assert answer.frequency_hz is None
 
 
-def test_spectra_axis_frequencies(client: Client) -> None:
-    """Spectra have an axis for the frequencies."""
+def test_spectra_have_an_axis_for_the_frequencies(client: Client) -> None:
     answer = client.frf(**PRESSED, preload_n=[1.0, 3.0], d33_pc_per_n=14.0, frequency_hz=[10, 20, 30])
     assert answer.frf_re_pc_per_n is not None
     assert answer.frf_re_pc_per_n == pytest.approx(np.repeat(answer.frf_pc_per_n[:, None], 3, axis=1))

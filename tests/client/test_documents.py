@@ -119,7 +119,6 @@ def test_fields_have_types_that_editors_complete() -> None:
     assert diagnosis.report["d33"]["value"] == diagnosis.report.d33.value
 
 
-def test_newer_older_server_answers_no_error() -> None:
-    """What a newer or an older server answers is no error."""
+def test_what_a_newer_or_an_older_server_answers_is_no_error() -> None:
     answer = MechanismEntry.from_json({"name": "adhesion", "own": False, "colour": "green"})
     assert (answer.name, answer["colour"], answer.package, answer.kinds) == ("adhesion", "green", None, ())

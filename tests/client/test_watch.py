@@ -38,8 +38,7 @@ def small(name: str) -> dict[str, Any]:
     return campaign(name, sensors=1, lines=5)
 
 
-def test_saved_sent_once_complete_once(server: Server, tmp_path: Path) -> None:
-    """What is saved is sent once complete and once only."""
+def test_what_is_saved_is_sent_once_complete_and_once_only(server: Server, tmp_path: Path) -> None:
     with bench(tmp_path, address(server), "once") as at:
         at.save("before.json", small("before"))
         at.start()
@@ -73,8 +72,7 @@ def test_saved_sent_once_complete_once(server: Server, tmp_path: Path) -> None:
         assert {entry["file"] for entry in at.journal()} == saved
 
 
-def test_refused_told_once_sent_again_changed(server: Server, tmp_path: Path) -> None:
-    """What is refused is told once and sent again when it has changed."""
+def test_what_is_refused_is_told_once_and_sent_again_when_it_has_changed(server: Server, tmp_path: Path) -> None:
     with bench(tmp_path, address(server), "refused") as at:
         spoilt = small("spoilt")
         for recording in spoilt["recordings"]:
@@ -118,8 +116,7 @@ def test_rig_description_used_makes_sense_file(server: Server, tmp_path: Path) -
         assert names(server, "rig") == ["block", "other"]
 
 
-def test_kill_sending_journal_doubles_nothing(server: Server, tmp_path: Path) -> None:
-    """A kill between the sending and the journal doubles nothing."""
+def test_a_kill_between_the_sending_and_the_journal_doubles_nothing(server: Server, tmp_path: Path) -> None:
     through = Network(address(server))
     with network(through) as url, bench(tmp_path, url, "killed") as at:
         at.save("first.json", small("first"))
@@ -137,8 +134,7 @@ def test_kill_sending_journal_doubles_nothing(server: Server, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("status", first(1, [507, 401, 502, 503]))
-def test_not_files_fault_tried(server: Server, tmp_path: Path, status: int) -> None:
-    """What is not the files fault is tried again."""
+def test_what_is_not_the_files_fault_is_tried_again(server: Server, tmp_path: Path, status: int) -> None:
     through = Network(address(server), status=status)
     with network(through) as url, bench(tmp_path, url, f"status-{status}") as at:
         at.save("first.json", small("first"))
@@ -155,11 +151,8 @@ def test_not_files_fault_tried(server: Server, tmp_path: Path, status: int) -> N
 
 
 @pytest.mark.slow
-def test_kills_random_moments_lose_double(server: Server, tmp_path: Path) -> None:
-    """Kills at random moments lose and double nothing.
-
-    Two files are saved for each watch that is killed: in the end there is each of them, once.
-    """
+def test_kills_at_random_moments_lose_and_double_nothing(server: Server, tmp_path: Path) -> None:
+    """Two files are saved for each watch that is killed: in the end there is each of them, once."""
     kills = 30 if os.environ.get("UNDERSKIN_SOAK") else 3
     moments = np.random.default_rng(900_013).uniform(SETTLE_S, SETTLE_S + 1.5, kills)
     with bench(tmp_path, address(server), "random") as at:
@@ -177,8 +170,7 @@ def test_kills_random_moments_lose_double(server: Server, tmp_path: Path) -> Non
     assert names(server, "random") == sorted(["last", *(f"{number} {one}" for number in range(kills) for one in "ab")])
 
 
-def test_server_goes_comes_back_gets_everything(tmp_path: Path) -> None:
-    """A server that goes and comes back gets everything once."""
+def test_a_server_that_goes_and_comes_back_gets_everything_once(tmp_path: Path) -> None:
     place = Place(tmp_path / "data")
     place.folder.mkdir()
     through = Network()
@@ -202,8 +194,7 @@ def test_server_goes_comes_back_gets_everything(tmp_path: Path) -> None:
             assert at.end() == 0
 
 
-def test_process_watches_folder_cannot_used_said(server: Server, tmp_path: Path) -> None:
-    """One process watches a folder and what cannot be used is said."""
+def test_one_process_watches_a_folder_and_what_cannot_be_used_is_said(server: Server, tmp_path: Path) -> None:
     with bench(tmp_path, address(server), "alone") as at:
         at.start()
         at.wait_for("watching")
@@ -223,8 +214,7 @@ def test_process_watches_folder_cannot_used_said(server: Server, tmp_path: Path)
         assert "cannot be read" in refused(str(at.folder))
 
 
-def test_key_not_known_ends_start(tmp_path: Path) -> None:
-    """A key that is not known ends it at the start."""
+def test_a_key_that_is_not_known_ends_it_at_the_start(tmp_path: Path) -> None:
     place = Place(tmp_path / "data")
     place.folder.mkdir()
     key = place.command("key", "create", "bench", "--scope", "write").stdout.strip()

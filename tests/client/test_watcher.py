@@ -93,8 +93,7 @@ def at(tmp_path: Path, clock: list[float]) -> Iterator[Bench]:
         yield bench
 
 
-def test_cannot_looked_told_once_sent(at: Bench) -> None:
-    """What cannot be looked at is told once and the others are sent."""
+def test_what_cannot_be_looked_at_is_told_once_and_the_others_are_sent(at: Bench) -> None:
     (at.folder / "loop.csv").symlink_to(at.folder / "loop.csv")
     (at.folder / "gone.csv").symlink_to(at.folder / "nothing.csv")
     inside = os.open(at.folder, os.O_RDONLY)
@@ -113,8 +112,7 @@ def test_cannot_looked_told_once_sent(at: Bench) -> None:
     assert len(at.told) == 3, at.told
 
 
-def test_watched_folder_gone_outage(at: Bench) -> None:
-    """A watched folder that is gone is an outage."""
+def test_a_watched_folder_that_is_gone_is_an_outage(at: Bench) -> None:
     moved = at.folder.with_name("moved")
     at.folder.rename(moved)
     assert [at.step(), at.step()] == [1.0, 2.0]
@@ -125,8 +123,7 @@ def test_watched_folder_gone_outage(at: Bench) -> None:
     assert at.told[1] == "sending goes on"
 
 
-def test_file_changes_sent_waits_until_complete(at: Bench) -> None:
-    """A file that changes while another one is sent waits until it is complete."""
+def test_a_file_that_changes_while_another_one_is_sent_waits_until_it_is_complete(at: Bench) -> None:
     complete = at.save("slow.json").read_bytes()
     os.utime(at.folder / "slow.json", (2000, 2000))
     at.save("first.json")
@@ -164,9 +161,7 @@ def _refused(status: int, allowed: str) -> ServiceError:
     ],
     ids=lambda error: str(error)[:60],
 )
-def test_refusal_pass_no_final_stops_no_file(at: Bench, error: ServiceError) -> None:
-    """A refusal that may pass is no final one and stops no other file."""
-
+def test_a_refusal_that_may_pass_is_no_final_one_and_stops_no_other_file(at: Bench, error: ServiceError) -> None:
     def refuse(path: Path) -> None:
         if path.name == "large.json":
             raise error
@@ -188,9 +183,7 @@ def test_refusal_pass_no_final_stops_no_file(at: Bench, error: ServiceError) -> 
     assert [name for name, _ in at.service.kept] == ["small.json", "large.json"]
 
 
-def test_retries_end_restart_sends(tmp_path: Path, clock: list[float]) -> None:
-    """Retries end and a restart sends again what is not in the journal."""
-
+def test_retries_end_and_a_restart_sends_again_what_is_not_in_the_journal(tmp_path: Path, clock: list[float]) -> None:
     def refuse(path: Path) -> None:
         if path.name == "large.json":
             raise _refused(413, "The body exceeds 100 MB; send less.")

@@ -61,10 +61,9 @@ def test_delay_either_sign_size_named(chain: dict[str, Any], delay_us: float, ta
         ],
     ),
 )
-def test_filter_within_band_named_corner_d33(
+def test_a_filter_within_the_band_is_named_with_its_corner_and_d33(
     chain: Any, mechanism: str, parameter: str, corner_hz: float, table: SigmaTable
 ) -> None:
-    """A filter within the band is named with its corner and d33."""
     report = diagnosed(table, charge=chain)
     assert report.verdict == "explained", report.statement
     assert named(report)[mechanism][parameter] == pytest.approx(corner_hz, rel=0.05)
@@ -102,11 +101,8 @@ def test_value_bound_search_explains_nothing(table: SigmaTable, monkeypatch: pyt
     assert report.verdict == "unexplained" or "at or beyond 60 Hz" in report.statement
 
 
-def test_unlisted_law_over_frequency_leaves(table: SigmaTable) -> None:
-    """An unlisted law over frequency leaves no d33 to quote.
-
-    A low-pass that no catalogue lists takes from the response within the band that d33 is read from.
-    """
+def test_an_unlisted_law_over_frequency_leaves_no_d33_to_quote(table: SigmaTable) -> None:
+    """A low-pass that no catalogue lists takes from the response within the band that d33 is read from."""
     left_out = [*OF_LINES, "amplifier_low_pass", "sensor_relaxation", "contact_resonance"]
     report = underskin.diagnose(shaken(charge=low_pass(100.0)), table, without=left_out)
     assert report.verdict == "unexplained", report.statement

@@ -25,8 +25,7 @@ ALONE = Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,))
 
 
 @pytest.mark.soak
-def test_reports_pages_dask_cluster_processes(tmp_path: Path) -> None:
-    """Reports and pages are the same on a dask cluster and in processes."""
+def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_path: Path) -> None:
     files = [tmp_path / f"palm-{number}.json" for number in range(2)]
     for file, made in zip(files, (replace(RESONANT, sensors=1, lines=10, preloads_n=(0.6, 2.4)), ALONE), strict=True):
         file.write_text(json.dumps(to_dict(campaign(made, load_table()))), encoding="utf-8")
@@ -51,11 +50,8 @@ def test_reports_pages_dask_cluster_processes(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_single_file_diagnosed_blas_thread(tmp_path: Path) -> None:
-    """A single file is diagnosed with one blas thread.
-
-    As it is in a process of many: so that its report is the same on any machine.
-    """
+def test_a_single_file_is_diagnosed_with_one_blas_thread(tmp_path: Path) -> None:
+    """As it is in a process of many: so that its report is the same on any machine."""
     file = tmp_path / "palm.json"
     file.write_text(json.dumps(to_dict(campaign(ALONE, load_table()))), encoding="utf-8")
     code = (

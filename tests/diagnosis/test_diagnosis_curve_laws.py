@@ -116,8 +116,7 @@ def test_law_found_numbers_predicts_held(name: str, reports: Callable[[str], dic
 
 
 @pytest.mark.parametrize("seed", first(1, [6, 7, 8]))
-def test_nothing_missing_no_law_stated(seed: int, table: SigmaTable) -> None:
-    """Where nothing is missing no law is stated."""
+def test_where_nothing_is_missing_no_law_is_stated(seed: int, table: SigmaTable) -> None:
     report = lean_report(parse(campaign({}, seed)), table, *FEW)
     assert report["verdict"] == "no_mismatch"
     assert report["unnamed"] is None
@@ -138,11 +137,8 @@ def test_slow_noise_that_the_air_shows_is_no_law(seed: int, table: SigmaTable) -
     assert report["fit"]["after"]["youngs_modulus"]["value"] == pytest.approx(MODULUS_MPA, rel=0.02)
 
 
-def test_named_law_stands_before_unnamed(table: SigmaTable) -> None:
-    """A named law that does the same stands before the unnamed one.
-
-    A stage that gives moves the surface by its deflection, which no law over the time can be told from beside it.
-    """
+def test_a_named_law_that_does_the_same_stands_before_the_unnamed_one(table: SigmaTable) -> None:
+    """A stage that gives moves the surface by its deflection, which no law over the time can be told from beside it."""
     stiffness = LARGEST / (0.05 * DEPTH_MM)
     travel = np.linspace(0.0, DEPTH_MM, 2000)
     commanded = travel + force_on(travel) / stiffness
@@ -153,14 +149,13 @@ def test_named_law_stands_before_unnamed(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize("name", first(1, LAWS))
-def test_law_curves_kept_recognised_name(
+def test_a_law_of_curves_is_kept_and_recognised_by_name(
     name: str,
     reports: Callable[[str], dict[str, Any]],
     table: SigmaTable,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A law of curves is kept and recognised by name."""
     changes = LAWS[name][0]
     (tmp_path / "kept.yaml").write_text(document(reports(name), "our_law"), encoding="utf-8")
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))

@@ -64,10 +64,9 @@ ONE = [
 
 
 @pytest.mark.parametrize(("change", "finding"), first(4, ONE))
-def test_wrong_curve_named_invents_nothing(
+def test_what_is_wrong_with_one_curve_is_named_and_invents_nothing(
     change: Change, finding: tuple[str, str, str], pads: Campaign, table: SigmaTable
 ) -> None:
-    """What is wrong with one curve is named and invents nothing."""
     report = looked_at(changed(pads, change, "c1"), table, "strain_stiffening")
     assert codes(report) == {finding}
     assert report["verdict"] == "no_mismatch"
@@ -95,16 +94,14 @@ def test_curves_off_nothing_concluded(field: str, factor: float, pads: Campaign,
     assert (meant["verdict"] == "insufficient_data") == ((field, factor) == ("displacement_mm", 1e3))
 
 
-def test_curves_far_declared_modulus_named(pads: Campaign, table: SigmaTable) -> None:
-    """Curves far from the declared modulus are named."""
+def test_curves_far_from_the_declared_modulus_are_named(pads: Campaign, table: SigmaTable) -> None:
     skin = replace(pads.skin, youngs_modulus_mpa=1000 * MODULUS_MPA)
     report = looked_at(replace(pads, skin=skin), table)
     assert codes(report) == {("units_off_by_1000", "", "force_n")}
     assert report["verdict"] == "insufficient_data"
 
 
-def test_two_curves_declared_modulus_tells_off(pads: Campaign, table: SigmaTable) -> None:
-    """Of two curves the declared modulus tells which is off."""
+def test_of_two_curves_the_declared_modulus_tells_which_is_off(pads: Campaign, table: SigmaTable) -> None:
     wrong = changed(replace(pads, recordings=pads.recordings[:2]), times(1e3, "force_n"), "c1")
     report = looked_at(wrong, table)
     assert {code for code, _, _ in codes(report)} == {"units_off_by_1000"}
@@ -134,8 +131,7 @@ def loops(*lengths: int | None) -> Campaign:
     return parse(document)
 
 
-def test_curve_cannot_used_named_diagnosed(table: SigmaTable) -> None:
-    """A curve that cannot be used is named and the others are diagnosed."""
+def test_a_curve_that_cannot_be_used_is_named_and_the_others_are_diagnosed(table: SigmaTable) -> None:
     report = looked_at(loops(None, 6), table, "layered_contact")
     (finding,) = [entry for entry in report["findings"] if entry["code"] == "curve_not_usable"]
     assert (finding["recording"], finding["field"]) == ("c02", "force_n")
@@ -143,8 +139,7 @@ def test_curve_cannot_used_named_diagnosed(table: SigmaTable) -> None:
     assert report["verdict"] != "insufficient_data"
 
 
-def test_no_curve_used_nothing_said(table: SigmaTable) -> None:
-    """Where no curve can be used nothing is said but that."""
+def test_where_no_curve_can_be_used_nothing_is_said_but_that(table: SigmaTable) -> None:
     report = looked_at(loops(4, 4), table)
     assert report["verdict"] == "insufficient_data"
     assert [entry["code"] for entry in report["findings"]] == ["curve_not_usable"] * 2

@@ -69,8 +69,7 @@ def ways(*ends: float, samples: int = 400) -> Floats:
 @pytest.mark.slow
 @pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS names no folder")
 @pytest.mark.parametrize("name", first(1, ["compression-EF10", "tension-RTV615", "compression-EF50"]))
-def test_silicone_stiffens_not_creep_nothing(name: str, table: SigmaTable) -> None:
-    """Silicone stiffens and does not creep where nothing tells time."""
+def test_silicone_stiffens_and_does_not_creep_where_nothing_tells_time(name: str, table: SigmaTable) -> None:
     (entry,) = [entry for entry in recorded() if entry.name == name]
     report = lean_report(
         parse(entry.make(Path(os.environ["UNDERSKIN_RECORDINGS"]))), table,
@@ -123,10 +122,9 @@ UNLISTED: list[tuple[dict[str, Any], dict[str, float]]] = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("effect", "noisy"), first(1, UNLISTED))
-def test_physics_no_law_describes_unexplained(
+def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_of_it(
     effect: dict[str, Any], noisy: dict[str, float], table: SigmaTable
 ) -> None:
-    """Physics that no law describes is unexplained although a law takes part of it."""
     report = lean_report(made({**RIG, "curves": {**RIG["curves"], **noisy}, "effects": effect}), table, *STICKY)
     assert report["verdict"] == "unexplained"
     assert report["probability"] > 0.9
@@ -138,11 +136,8 @@ def test_physics_no_law_describes_unexplained(
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])
-def test_known_stiffness_stage_decides_contact(stiffness: float | None) -> None:
-    """The known stiffness of a stage decides where contact ends.
-
-    Against JKR's equilibrium, from its two equations alone.
-    """
+def test_the_known_stiffness_of_a_stage_decides_where_contact_ends(stiffness: float | None) -> None:
+    """Against JKR's equilibrium, from its two equations alone."""
     radius, modulus, work = 7.5e-6, 1e6, 0.040
     reduced, a = modulus / 0.75, np.geomspace(1e-8, 6e-6, 100_001)
     depth = a**2 / radius - np.sqrt(2 * np.pi * work * a / reduced)
@@ -158,8 +153,7 @@ def test_known_stiffness_stage_decides_contact(stiffness: float | None) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("samples", "ripple"), first(1, [(360, 5e-3), (1500, 0.0)]))
-def test_plain_least_squares_leaves_scipy_leaves(samples: int, ripple: float, table: SigmaTable) -> None:
-    """Plain least squares leaves what scipy leaves."""
+def test_plain_least_squares_leaves_what_scipy_leaves(samples: int, ripple: float, table: SigmaTable) -> None:
     random = np.random.default_rng(4)
     displacement = np.linspace(-0.1, 0.4, samples)
     depth = np.maximum(displacement - 0.02, 0.0)
@@ -216,11 +210,8 @@ def cylinders(heights_mm: list[float], table: SigmaTable, *known: str, **effects
 
 
 @pytest.mark.slow
-def test_friction_platens_told_modulus_two(table: SigmaTable) -> None:
-    """Friction at the platens is told from the modulus by two shapes alone.
-
-    Of cylinders of one shape the interval of the modulus holds both.
-    """
+def test_friction_at_the_platens_is_told_from_the_modulus_by_two_shapes_alone(table: SigmaTable) -> None:
+    """Of cylinders of one shape the interval of the modulus holds both."""
     for effects in ({}, {"platen_friction": {"friction": 0.9}}):
         modulus = cylinders([2.5], table, "platen_friction", **effects)["fit"]["before"]["youngs_modulus"]
         assert modulus["low"] < 12.0 < modulus["high"]
@@ -269,8 +260,7 @@ def test_a_strip_is_called_softer_only_where_it_is(table: SigmaTable) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", first(1, [1, 2]))
-def test_seating_platen_no_stiffening_stiffening(seed: int, table: SigmaTable) -> None:
-    """A seating platen is no stiffening and stiffening no seat."""
+def test_a_seating_platen_is_no_stiffening_and_stiffening_no_seat(seed: int, table: SigmaTable) -> None:
     curves = {
         "heights_mm": [10.0], "diameters_mm": [20.0], "largest_displacement_mm": 1.0, "samples": 120, "repeats": 3,
         "force_noise_n": 0.1, "contact_point_mm": 0.03, "modulus_declared": False,
@@ -288,11 +278,8 @@ def test_seating_platen_no_stiffening_stiffening(seed: int, table: SigmaTable) -
 
 
 @pytest.mark.soak
-def test_two_mechanisms_share_bend_found(table: SigmaTable) -> None:
-    """Two mechanisms that share a bend are both found.
-
-    An elastomer whose modulus grows with the strain, pressed by a stage that gives: each bends the curves alike.
-    """
+def test_two_mechanisms_that_share_a_bend_are_both_found(table: SigmaTable) -> None:
+    """An elastomer whose modulus grows with the strain, pressed by a stage that gives: each bends the curves alike."""
     whole = parse(campaign_of_curves(*drawn_curves(777001, 109, INDENTATION, "pair")))
     report = lean_report(whole, table, *STAGE)
     found = {entry["name"]: entry["parameters"] for entry in report["mechanisms"]}
@@ -348,6 +335,7 @@ def test_drag_of_a_liquid_leaves_the_modulus() -> None:
     assert found.low <= drag <= found.high
 
 
+@pytest.mark.slow
 def test_a_friction_of_the_guide_reads_as_drag_at_one_speed() -> None:
     """A constant force against the motion of a sphere that moves in and back at one speed: E is right, and the drag is
     said to be a possible friction, with its size beside that of water."""

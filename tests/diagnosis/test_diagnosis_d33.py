@@ -41,12 +41,9 @@ def test_stated_d33_holds_true_beside_effect(factor: float, table: SigmaTable) -
     assert not certain["low"] < NARROW.d33_pc_per_n < certain["high"]
 
 
-def test_tolerances_widen_absolute_interval(table: SigmaTable) -> None:
-    """Tolerances widen the absolute interval alone.
-
-    The sensor's radius enters as rT² at most; E and h, which the recordings do not tell, by their slopes at the
-    contact: √((s_r r)² + (s_h h)² + (s_E E)²) of each tolerance beyond the fit's own prior.
-    """
+def test_tolerances_widen_the_absolute_interval_alone(table: SigmaTable) -> None:
+    """The sensor's radius enters as rT² at most; E and h, which the recordings do not tell, by their slopes at the
+    contact: √((s_r r)² + (s_h h)² + (s_E E)²) of each tolerance beyond the fit's own prior."""
     made = campaign(NARROW, table)
 
     def log_width(interval: Mapping[str, float]) -> float:
@@ -68,11 +65,8 @@ def test_tolerances_widen_absolute_interval(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize(("times", "said"), [(2.0, "2 times the declared 14 pC/N"), (1.0, "")])
-def test_charge_taken_peak_peak_shows_beside(times: float, said: str, table: SigmaTable) -> None:
-    """A charge taken peak to peak shows beside the declared d33.
-
-    Nothing else in the recordings tells a factor on all of them.
-    """
+def test_a_charge_taken_peak_to_peak_shows_beside_the_declared_d33(times: float, said: str, table: SigmaTable) -> None:
+    """Nothing else in the recordings tells a factor on all of them."""
     made = campaign(replace(NARROW, d33_pc_per_n=D33 * times), table)
     statement = lean_report(replace(made, skin=replace(made.skin, d33_pc_per_n=D33)), table, *DECLARED)["statement"]
     assert said in statement
@@ -102,11 +96,8 @@ def reported(
     return lean_report(parse(campaign_of_lines(record_lines(experiment(described)))), table, *left_out)
 
 
-def test_thickness_centred_presses_not_show(table: SigmaTable) -> None:
-    """A thickness that centred presses do not show keeps d33 from being quoted.
-
-    Told 15 % too thin, the skin answers like another d33.
-    """
+def test_a_thickness_that_centred_presses_do_not_show_keeps_d33_from_being_quoted(table: SigmaTable) -> None:
+    """Told 15 % too thin, the skin answers like another d33."""
     found = reported(CENTRED, 1.15, [4.0], table)
     assert found["verdict"] == "no_mismatch"
     assert not found["d33"]["low"] < D33 < found["d33"]["high"]
@@ -119,8 +110,7 @@ def test_thickness_centred_presses_not_show(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.15])
-def test_presses_beside_sensors_tell_thickness(factor: float, table: SigmaTable) -> None:
-    """Presses beside the sensors tell the thickness and d33."""
+def test_presses_beside_the_sensors_tell_the_thickness_and_d33(factor: float, table: SigmaTable) -> None:
     found = reported(BESIDE, factor, [4.0, 10.0], table, *DECLARED)
     assert [entry["name"] for entry in found["mechanisms"]] == (["thickness_error"] if factor != 1.0 else [])
     assert found["d33"]["low"] < D33 < found["d33"]["high"]
@@ -128,11 +118,8 @@ def test_presses_beside_sensors_tell_thickness(factor: float, table: SigmaTable)
     assert "why_not" not in found["d33"]
 
 
-def test_physics_not_show_stands_beside_value(table: SigmaTable) -> None:
-    """Physics that would not show stands beside the value to quote.
-
-    A glue line that slips changes d33 alone; presses 1 mm beside the sensor tell the thickness, but not that.
-    """
+def test_physics_that_would_not_show_stands_beside_the_value_to_quote(table: SigmaTable) -> None:
+    """A glue line that slips changes d33 alone; presses 1 mm beside the sensor tell the thickness, but not that."""
     found = reported([[0.0, 0.0], [1.0, 0.0]], 1.0, [4.0], table, *DECLARED)
     assert found["d33"]["quotable"]
     (entry,) = [one for one in found["not_identifiable"] if one["mechanism"] == "interface_slip"]
@@ -141,11 +128,8 @@ def test_physics_not_show_stands_beside_value(table: SigmaTable) -> None:
     assert f"provided that there is no interface slip ({percent})" in found["statement"]
 
 
-def test_law_declared_facts_say_stands_among(table: SigmaTable) -> None:
-    """A law that declared facts say stands among the idealised.
-
-    Whether the base shows under the contact is told where it is wide, and left at even odds where it is narrow.
-    """
+def test_a_law_that_declared_facts_say_stands_among_the_idealised(table: SigmaTable) -> None:
+    """Whether the base shows under the contact is told where it is wide, and left at even odds where it is narrow."""
     narrow, wide = (
         whole_report(
             campaign(Made(spheres_mm=spheres, preloads_n=preloads, thickness_mm=h), table),

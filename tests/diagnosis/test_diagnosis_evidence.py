@@ -148,14 +148,11 @@ def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTa
 
 
 @pytest.mark.parametrize(("names", "values"), [CASES[index] for index in first(3, (0, 1, 17, 10, 4))])
-def test_evidence_agrees_importance_sampling(
+def test_evidence_agrees_with_importance_sampling(
     names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
 ) -> None:
-    """Evidence agrees with importance sampling.
-
-    Laplace's method against the mean of density over Student's t around the mode. A time that the lines leave open has
-    a tail that no quadratic holds: up to two nats.
-    """
+    """Laplace's method against the mean of density over Student's t around the mode. A time that the lines leave open
+    has a tail that no quadratic holds: up to two nats."""
     found = laplace_of(names, values, table)
     assert found.log_evidence == pytest.approx(importance(found), abs=2.0 if "sensor_relaxation" in names else 0.5)
 

@@ -44,8 +44,7 @@ def test_exchanged_labels_contradict_the_places(good: Campaign, table: SigmaTabl
     require_put_right(changed(two, exchanged("s0", "s1")), two, table, "'s0' and 's1'", "labels")
 
 
-def test_exchange_shows_nowhere_contact_sensor(good: Campaign, table: SigmaTable) -> None:
-    """An exchange shows nowhere where each contact is on its own sensor."""
+def test_an_exchange_shows_nowhere_where_each_contact_is_on_its_own_sensor(good: Campaign, table: SigmaTable) -> None:
     centred = changed(good, lambda entry, _: replace(entry, position_mm=None))
     assert named(changed(centred, exchanged("s0", "s2")), table) == []
 
@@ -62,21 +61,15 @@ def test_cables_exchanged_from_some_recording_on(good: Campaign, table: SigmaTab
 
 
 @pytest.mark.parametrize("since", first(1, [20, 0]))
-def test_rotated_connector_put_right_whole(since: int, good: Campaign, table: SigmaTable) -> None:
-    """A rotated connector is put right as a whole.
-
-    A plug that is off by one: each label is the next sensor's.
-    """
+def test_a_rotated_connector_is_put_right_as_a_whole(since: int, good: Campaign, table: SigmaTable) -> None:
+    """A plug that is off by one: each label is the next sensor's."""
     following = {"s0": "s1", "s1": "s2", "s2": "s0"}
     wrong = changed(good, lambda entry, n: replace(entry, sensor=following[entry.sensor]) if n >= since else entry)
     require_put_right(wrong, good, table, "s0", "s1", "s2")
 
 
-def test_labels_no_permutation_explains_left(table: SigmaTable) -> None:
-    """Labels that no permutation explains are left out.
-
-    The channel of s0 has the charge of s1, that of s1 the charge of s2, that of s2 none; s3 is right.
-    """
+def test_labels_that_no_permutation_explains_are_left_out(table: SigmaTable) -> None:
+    """The channel of s0 has the charge of s1, that of s1 the charge of s2, that of s2 none; s3 is right."""
     random = np.random.default_rng(6)
 
     def shifted(entry: FrfRecording, _: int) -> FrfRecording:
@@ -136,12 +129,9 @@ def test_two_sensors_fall_silent_together_left(good: Campaign, table: SigmaTable
 
 
 @pytest.mark.soak
-def test_failure_sensors_not_share_no_exchange(good: Campaign, table: SigmaTable) -> None:
-    """A failure that sensors do not share is no exchange.
-
-    The last recording of s0 and of s2, both before s1; all sensors, of which the amplifier may have failed; and a
-    sensor that steps to just the level that another one has.
-    """
+def test_a_failure_that_sensors_do_not_share_is_no_exchange(good: Campaign, table: SigmaTable) -> None:
+    """The last recording of s0 and of s2, both before s1; all sensors, of which the amplifier may have failed; and a
+    sensor that steps to just the level that another one has."""
     at = {name: [n for n, entry in enumerate(frf_recordings(good)) if entry.sensor == name] for name in ("s0", "s2")}
     last = {own[-1] for own in at.values()}
     change, all_of_them = unheard(("s0", "s2"), 0), unheard(("s0", "s1", "s2"), 26)
@@ -159,11 +149,8 @@ def test_failure_sensors_not_share_no_exchange(good: Campaign, table: SigmaTable
     assert named(changed(good, stepped), table, "sensor_spread") == []
 
 
-def test_silent_recording_near_crossing_zero(table: SigmaTable) -> None:
-    """A silent recording near a crossing of zero is physics.
-
-    The rig's layer is thinner than declared, so that one contact beside its sensor lies where σ crosses zero.
-    """
+def test_a_silent_recording_near_a_crossing_of_zero_is_physics(table: SigmaTable) -> None:
+    """The rig's layer is thinner than declared, so that one contact beside its sensor lies where σ crosses zero."""
     description = drawn(956789, 88, "single")
     assert set(description["effects"]) == {"thickness_error"}
     made, _ = from_dict(recorded_campaign(record(description)))

@@ -128,8 +128,8 @@ def test_an_impossible_skin_is_named(table: SigmaTable) -> None:
     assert f"skin.{field}" in report["statement"]
 
 
-def test_faint_forces_soft_cantilever_meant(table: SigmaTable) -> None:
-    """The faint forces of a soft cantilever are meant."""
+@pytest.mark.slow
+def test_the_faint_forces_of_a_soft_cantilever_are_meant(table: SigmaTable) -> None:
     random = np.random.default_rng(3)
     depth_mm = np.linspace(-5e-4, 5e-4, 600)
     force = 16 / 9 * 2e3 * np.sqrt(1e-5) * (1e-3 * np.maximum(depth_mm, 0.0)) ** 1.5  # N, of a gel of 2 kPa

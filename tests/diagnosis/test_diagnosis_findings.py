@@ -101,13 +101,10 @@ ONE = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("change", "which", "finding", "scale"), first(9, ONE))
-def test_wrong_named_not_count(
+def test_what_is_wrong_is_named_and_does_not_count(
     change: Change, which: Which, finding: tuple[str, str, str], scale: float, good: Campaign, table: SigmaTable
 ) -> None:
-    """What is wrong is named and does not count.
-
-    The rest agrees with the model, at the d33 that it has without; of lines a thousandth, at a thousandth of it.
-    """
+    """The rest agrees with the model, at the d33 that it has without; of lines a thousandth, at a thousandth of it."""
     report = looked_at(changed(good, change, which), table)
     assert finding in codes(report)
     assert {code for code, _, _ in codes(report)} - {"implausible_d33"} == {finding[0]}
@@ -201,16 +198,14 @@ def test_sensors_in_other_units_are_named(factor: float, good: Campaign, table: 
     assert {field for _, _, field in codes(report)} <= {"skin.sensors", "skin.sensor_radius_mm"}
 
 
-def test_offsets_metres_sensor_named(table: SigmaTable) -> None:
-    """Offsets in metres at the only sensor are named."""
+def test_offsets_in_metres_at_the_only_sensor_are_named(table: SigmaTable) -> None:
     made = campaign(Made(sensors=1, offsets_mm=(0.0, 1.0, 2.0), lines=8), table)
     report = looked_at(changed(made, away(1e-3), of_all), table)
     assert ("units_off_by_1000", "", "position_mm") in codes(report)
     assert report["verdict"] == "insufficient_data"
 
 
-def test_recordings_refused_said(good: Campaign, table: SigmaTable) -> None:
-    """Recordings that were all refused are said to be."""
+def test_recordings_that_were_all_refused_are_said_to_be(good: Campaign, table: SigmaTable) -> None:
     document = to_dict(changed(good, times(1e3, "indenter_radius_mm"), of_all))
     read, refused = from_dict(document)
     report = underskin.diagnose(Reading(read, refused, []), table)
@@ -227,8 +222,7 @@ def test_copies_are_found_through_rounding(good: Campaign, table: SigmaTable) ->
     assert report["d33"] == looked_at(good, table)["d33"]
 
 
-def test_recordings_made_alike_frequency_tell(table: SigmaTable) -> None:
-    """Recordings made alike at one frequency tell nothing."""
+def test_recordings_made_alike_at_one_frequency_tell_nothing(table: SigmaTable) -> None:
     alike = campaign(Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,), repeats=6, lines=1), table)
     entries = [replace(entry, load_cycles=1, dwell_s=1.0, recorded_at=None) for entry in alike.recordings]
     report = looked_at(replace(alike, recordings=tuple(entries)), table)
@@ -237,8 +231,7 @@ def test_recordings_made_alike_frequency_tell(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize("factor", [1e3, -1.0])
-def test_three_recordings_off_named_two_neither(factor: float, table: SigmaTable) -> None:
-    """Of three recordings the one that is off is named and of two neither."""
+def test_of_three_recordings_the_one_that_is_off_is_named_and_of_two_neither(factor: float, table: SigmaTable) -> None:
     made = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.5, 1.0, 2.0)), table)
     wrong = changed(made, times(factor, *LINES), lambda entry: entry.id == "r1")
     code = "units_off_by_1000" if factor > 0 else "sign_flipped"
@@ -249,11 +242,8 @@ def test_three_recordings_off_named_two_neither(factor: float, table: SigmaTable
 
 
 @pytest.mark.slow
-def test_period_not_fit_recordings_named(good: Campaign, table: SigmaTable) -> None:
-    """A period that does not fit between recordings is named.
-
-    From 0.03 to 3.9 Hz is no impossible sweep, but not one in 20 s.
-    """
+def test_a_period_that_does_not_fit_between_recordings_is_named(good: Campaign, table: SigmaTable) -> None:
+    """From 0.03 to 3.9 Hz is no impossible sweep, but not one in 20 s."""
 
     def dated(entry: FrfRecording) -> FrfRecording:
         number = int(entry.id[1:])
@@ -268,11 +258,8 @@ def test_period_not_fit_recordings_named(good: Campaign, table: SigmaTable) -> N
 
 
 @pytest.mark.slow
-def test_reversed_recording_told_beside(table: SigmaTable) -> None:
-    """A reversed recording is told beside a resonance.
-
-    Few lines over a resonance differ as much as noise would, and their mean cancels: they are no silence.
-    """
+def test_a_reversed_recording_is_told_beside_a_resonance(table: SigmaTable) -> None:
+    """Few lines over a resonance differ as much as noise would, and their mean cancels: they are no silence."""
     made = Made(("contact_resonance",), (6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0)
     for parameters in ((30.0, 0.05), (6.0, 0.02)):
         resonant = campaign(replace(made, parameters=parameters), table)
@@ -282,12 +269,9 @@ def test_reversed_recording_told_beside(table: SigmaTable) -> None:
 
 
 @pytest.mark.slow
-def test_little_expected_silence_kept(table: SigmaTable) -> None:
-    """Where little is expected silence is kept.
-
-    Far beside the sensor the response is below the noise, as the model says: no sensor is dead, and such recordings are
-    counted as those of far contacts.
-    """
+def test_where_little_is_expected_silence_is_kept(table: SigmaTable) -> None:
+    """Far beside the sensor the response is below the noise, as the model says: no sensor is dead, and such recordings
+    are counted as those of far contacts."""
     far = campaign(Made(offsets_mm=(0.0, 5.5), lines=20, line=0.01), table)
     random = np.random.default_rng(2)
 
@@ -297,6 +281,7 @@ def test_little_expected_silence_kept(table: SigmaTable) -> None:
     assert codes(looked_at(added(far, noise), table)) == {("far_contacts", "", "position_mm")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("spread", "differs"), [(0.009, False), (0.02, True)])
 def test_forces_within_a_percent_are_one_force(spread: float, differs: bool, good: Campaign, table: SigmaTable) -> None:
     """As a shaker without a closed loop gives them."""
@@ -310,11 +295,8 @@ def test_forces_within_a_percent_are_one_force(spread: float, differs: bool, goo
 
 
 @pytest.mark.slow
-def test_bands_stamps_meant_no_slips(table: SigmaTable) -> None:
-    """Bands and stamps that may be meant are no slips.
-
-    Three bands of one sensor; and three sensors recorded at once, saved one after the other.
-    """
+def test_bands_and_stamps_that_may_be_meant_are_no_slips(table: SigmaTable) -> None:
+    """Three bands of one sensor; and three sensors recorded at once, saved one after the other."""
     three = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40), table)
     bands = ((0.1, 1.0), (1.0, 29.0), (30.0, 1000.0))
     banded = [
@@ -332,8 +314,7 @@ def test_bands_stamps_meant_no_slips(table: SigmaTable) -> None:
         assert report["verdict"] != "insufficient_data"
 
 
-def test_places_rounding_leaves_zero_meant(table: SigmaTable) -> None:
-    """Places that rounding leaves where zero is meant are no impossible numbers."""
+def test_places_that_rounding_leaves_where_zero_is_meant_are_no_impossible_numbers(table: SigmaTable) -> None:
     made = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40), table)
     places = np.arange(-0.6, 0.7, 0.2)[2:5]
     assert 0 < abs(places[1]) < 1e-15

@@ -64,13 +64,10 @@ def departing(departing_and_page: tuple[dict[str, Any], str]) -> dict[str, Any]:
     return held(departing_and_page[0])
 
 
-def test_skins_depart_named_quantity_tell(
+def test_skins_that_depart_are_named_each_in_its_quantity_and_tell_nothing_of_the_others(
     departing: dict[str, Any],
 ) -> None:
-    """Skins that depart are named each in its quantity and tell nothing of the others.
-
-    What is declared of all skins is wrong for one: `modulus_error` has that skin alone in its scope.
-    """
+    """What is declared of all skins is wrong for one: `modulus_error` has that skin alone in its scope."""
     assert departures(departing) == {"weak": "d33", "soft": "youngs_modulus", "thin": "thickness"}
     assert {entry["name"]: entry["scope"] for entry in departing["mechanisms"]} == {
         "modulus_error": {"skins": ["soft"]}, "thickness_error": {"skins": ["thin"]}
@@ -88,10 +85,9 @@ def test_skins_depart_named_quantity_tell(
             assert own["low"] < truth < own["high"], (parameter, skin)
 
 
-def test_statement_tells_departures_words_skins(
+def test_the_statement_tells_departures_in_words_and_of_which_skins_d33_may_be_quoted(
     departing: dict[str, Any],
 ) -> None:
-    """The statement tells departures in words and of which skins d33 may be quoted."""
     statement = departing["statement"]
     assert "One departs, weak, in d33: " in statement
     assert "one departs, soft, in Young's modulus: " in statement
@@ -100,8 +96,7 @@ def test_statement_tells_departures_words_skins(
     assert "no skin's own" in statement
 
 
-def test_skin_stands_band_population(departing_and_page: tuple[dict[str, Any], str]) -> None:
-    """Each skin stands on the band of its population."""
+def test_each_skin_stands_on_the_band_of_its_population(departing_and_page: tuple[dict[str, Any], str]) -> None:
     fleet, page = departing_and_page
     figure, d33 = figures_in(page)["population"], population(fleet, "d33")
     band = figure.layout.shapes[0]
@@ -118,11 +113,8 @@ def test_skin_stands_band_population(departing_and_page: tuple[dict[str, Any], s
 
 
 @pytest.mark.soak
-def test_block_measured_apart_skin_tells_modulus(table: SigmaTable) -> None:
-    """A block measured apart for one skin tells the modulus of its sisters.
-
-    E is 9 where 16 is declared of all, which FRFs of three skins do not tell: none departs.
-    """
+def test_a_block_measured_apart_for_one_skin_tells_the_modulus_of_its_sisters(table: SigmaTable) -> None:
+    """E is 9 where 16 is declared of all, which FRFs of three skins do not tell: none departs."""
     skins = {f"s{number}": [made(f"c{number}", seed=10 + number, modulus=9.0)] for number in range(3)}
     skins["s0"].append(of_block(9.0))
     fleet = reported(skins, table)
@@ -157,13 +149,10 @@ def test_skins_differ_make_none_departs(table: SigmaTable) -> None:
 
 
 @pytest.mark.soak
-def test_skin_few_recordings_borrows_strength(table: SigmaTable) -> None:
-    """A skin of few recordings borrows strength from its sisters.
-
-    Of two its own recordings tell no d33 to quote; of four alone the interval is wider than of two among sisters,
+def test_a_skin_of_few_recordings_borrows_strength_from_its_sisters(table: SigmaTable) -> None:
+    """Of two its own recordings tell no d33 to quote; of four alone the interval is wider than of two among sisters,
     which holds the true d33 in all draws but one. In what one of them departs is open, so that the verdict is
-    ambiguous, and the headline no surer.
-    """
+    ambiguous, and the headline no surer."""
     others = {**sisters(3), "weak": [made("weak", seed=41, d33=12.5)]}
     inside, widths = [], []
     for seed in first(1, range(6)):

@@ -52,13 +52,10 @@ def exact() -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("kind", "design", "width"), first(1, [("compression", BLOCK, 1.45), ("indentation", SPHERE, 1.2)])
 )
-def test_curves_tell_wrong_modulus_frfs_alone(
+def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
     kind: str, design: Mapping[str, Any], width: float, of_frfs_alone: dict[str, Any], table: SigmaTable
 ) -> None:
-    """Curves tell a wrong modulus that frfs alone cannot.
-
-    How wide a block has E depends on friction, which one shape does not tell.
-    """
+    """How wide a block has E depends on friction, which one shape does not tell."""
     alone = of_frfs_alone
     assert alone["verdict"] == "ambiguous"
     assert "by_kind" not in alone
@@ -78,8 +75,7 @@ def test_curves_tell_wrong_modulus_frfs_alone(
     assert "A compressed block" not in ((together["next_experiment"] or {}).get("statement") or "")
 
 
-def test_acts_block_alone_named_beside_frfs(table: SigmaTable) -> None:
-    """What acts on the block alone is named beside the frfs."""
+def test_what_acts_on_the_block_alone_is_named_beside_the_frfs(table: SigmaTable) -> None:
     blocks = {**BLOCK, "heights_mm": [4, 12], "diameters_mm": [20, 20]}
     rubbed = curves("compression", blocks, effects={"platen_friction": {"friction": 0.6}})
     document = report(lines(), rubbed, table, *DECLARED)
@@ -92,8 +88,7 @@ def test_acts_block_alone_named_beside_frfs(table: SigmaTable) -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("friction", [0.3, 0.0, 0.8])
-def test_modulus_holds_whatever_friction_samples(friction: float, table: SigmaTable) -> None:
-    """A modulus holds whatever friction samples of one shape hide."""
+def test_a_modulus_holds_whatever_friction_samples_of_one_shape_hide(friction: float, table: SigmaTable) -> None:
     blocks = curves("compression", BLOCK, effects={"platen_friction": {"friction": friction}} if friction else {})
     document = report(lines(), blocks, table, *DECLARED)
     assert (document["verdict"], document["contradictions"]) == ("no_mismatch", [])
@@ -105,11 +100,8 @@ def test_modulus_holds_whatever_friction_samples(friction: float, table: SigmaTa
 
 
 @pytest.mark.soak
-def test_wrong_modulus_found_beside_curves_show(table: SigmaTable) -> None:
-    """A wrong modulus is found beside what the curves show as well.
-
-    Neither the law of a thin layer nor another modulus alone explains both kinds: the curves ask for both.
-    """
+def test_a_wrong_modulus_is_found_beside_what_the_curves_show_as_well(table: SigmaTable) -> None:
+    """Neither the law of a thin layer nor another modulus alone explains both kinds: the curves ask for both."""
     layer: Effects = {"layered_contact": {}}
     deep = {**SPHERE, "largest_displacement_mm": 0.8}
     document = report(lines(9.0, layer), curves("indentation", deep, 9.0, layer), table, *LAYER)
@@ -119,8 +111,7 @@ def test_wrong_modulus_found_beside_curves_show(table: SigmaTable) -> None:
     assert told["low"] < 9.0 < told["high"]
 
 
-def test_indentation_tells_adhesion_frfs_not_see(table: SigmaTable) -> None:
-    """An indentation tells the adhesion that frfs do not see."""
+def test_an_indentation_tells_the_adhesion_that_frfs_do_not_see(table: SigmaTable) -> None:
     sticky = {"adhesion": {"work_j_per_m2": 2.0}}
     measured = lines(effects=sticky)
     assert report(measured, [], table, *STICKY)["verdict"] == "no_mismatch"
@@ -148,8 +139,7 @@ def test_stiffening_block_skins_although_frfs(law: str, coefficient: float, dept
     assert told["high"] / told["low"] < 2.0
 
 
-def test_block_elastomer_contradicts(exact: dict[str, Any], table: SigmaTable) -> None:
-    """A block of another elastomer contradicts."""
+def test_a_block_of_another_elastomer_contradicts(exact: dict[str, Any], table: SigmaTable) -> None:
     document = report(exact, curves("compression", BLOCK, 48.0), table, *DECLARED)
     (contradiction,) = document["contradictions"]
     assert contradiction["kinds"] == ["frf", "compression"]
@@ -158,11 +148,8 @@ def test_block_elastomer_contradicts(exact: dict[str, Any], table: SigmaTable) -
     assert modulus_of(document, "compression")["value"] == pytest.approx(48.0, rel=0.05)
 
 
-def test_indentations_block_data_set(table: SigmaTable) -> None:
-    """Indentations and a block are one data set too.
-
-    And of a block alone the modulus that is stated is the true one, not the declared one.
-    """
+def test_indentations_and_a_block_are_one_data_set_too(table: SigmaTable) -> None:
+    """And of a block alone the modulus that is stated is the true one, not the declared one."""
     both = [*curves("indentation", SPHERE, 9.0), *curves("compression", BLOCK, 9.0)]
     document: dict[str, Any] = {"schema": "campaign/1", "name": "curves", "skin": lines()["skin"], "recordings": []}
     undeclared = deepcopy(document)
@@ -201,14 +188,11 @@ RELAXING: list[tuple[float, float, list[float], dict[str, Any], float]] = [
 
 
 @pytest.mark.parametrize(("fraction", "time_s", "dwells", "pressing", "gain"), first(1, RELAXING))
-def test_relaxation_told_kind_shows(
+def test_relaxation_is_told_by_the_kind_that_shows_it(
     fraction: float, time_s: float, dwells: list[float], pressing: dict[str, Any], gain: float, table: SigmaTable
 ) -> None:
-    """Relaxation is told by the kind that shows it.
-
-    Curves of two seconds tell g/τ of a relaxation of a minute alone, FRFs of three dwells both; a hold tells g and
-    τ, FRFs of few dwells, with much scatter, neither.
-    """
+    """Curves of two seconds tell g/τ of a relaxation of a minute alone, FRFs of three dwells both; a hold tells g and
+    τ, FRFs of few dwells, with much scatter, neither."""
     creep: Effects = {"contact_creep": {"fraction": fraction, "time_s": time_s}}
     design = {**LINES["design"], "dwells_s": dwells}
     described = {**LINES, "design": design, "noise": {**LINES["noise"], "gain": gain}, "seed": 4, "effects": creep}
@@ -222,11 +206,8 @@ def test_relaxation_told_kind_shows(
 
 
 @pytest.mark.soak
-def test_indentations_feel_base_tell_thickness(table: SigmaTable) -> None:
-    """Indentations that feel the base tell the thickness that is declared wrongly.
-
-    E of such curves holds although the declared thickness is 15 % too large.
-    """
+def test_indentations_that_feel_the_base_tell_the_thickness_that_is_declared_wrongly(table: SigmaTable) -> None:
+    """E of such curves holds although the declared thickness is 15 % too large."""
     both: Effects = {"layered_contact": {}, "thickness_error": {"factor": 0.87}}
     deep = {**SPHERE, "largest_displacement_mm": 0.8, "indenters_mm": [3]}
     pressed = curves("indentation", deep, effects={"layered_contact": {}}, thickness=0.87 * SKIN["thickness_mm"])

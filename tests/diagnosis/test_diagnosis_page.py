@@ -180,8 +180,7 @@ def test_browser_draws_every_figure_whole(attacked: str, tmp_path: Path) -> None
 
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-def test_list_keys_reach_chooses_recording(tmp_path: Path) -> None:
-    """A list that keys reach chooses the recording."""
+def test_a_list_that_keys_reach_chooses_the_recording(tmp_path: Path) -> None:
     choosing = "const list = document.querySelector('label select'); list.selectedIndex = 1; "
     choosing += "list.dispatchEvent(new Event('change')); const drawn = document.getElementById('figure-curve');"
     choosing += "const bottom = (one) => one.getBoundingClientRect().bottom;"
@@ -200,8 +199,7 @@ def test_list_keys_reach_chooses_recording(tmp_path: Path) -> None:
     ],
     ids=["nothing", "too little"],
 )
-def test_report_without_mechanisms_page(made: Made, verdict: str, names: set[str], table: SigmaTable) -> None:
-    """A report without mechanisms has its page."""
+def test_a_report_without_mechanisms_has_its_page(made: Made, verdict: str, names: set[str], table: SigmaTable) -> None:
     report, text = written([to_dict(campaign(made, table))], without=EVERY)
     tags = Tags(text)
     assert (report["verdict"], set(figures_in(text))) == (verdict, names)
@@ -279,11 +277,8 @@ def in_lab_units(recording: str, shows: str) -> tuple[Floats, Floats]:
     return np.asarray(trace.x) * trace.meta["mm"], np.asarray(trace.y) * trace.meta["n"]
 
 
-def test_curves_explained_adhesion_alone_page() -> None:
-    """Curves are explained by adhesion alone and their page says the modulus.
-
-    A jump into contact between two samples asks for no companion.
-    """
+def test_curves_are_explained_by_adhesion_alone_and_their_page_says_the_modulus() -> None:
+    """A jump into contact between two samples asks for no companion."""
     report, text = adhesive_page()
     assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == ("explained", ["adhesion"])
     modulus = report["fit"]["after"]["youngs_modulus"]
@@ -296,8 +291,7 @@ def test_curves_explained_adhesion_alone_page() -> None:
     assert titles == ["force [N]", "residual<br>before [mN]", "residual<br>after [mN]"]
 
 
-def test_residual_curve_measured_less_predicted() -> None:
-    """The residual of a curve is what was measured less what is predicted."""
+def test_the_residual_of_a_curve_is_what_was_measured_less_what_is_predicted() -> None:
     for which in ("before", "after"):
         depth, predicted = in_lab_units("c01", which)
         place, left = in_lab_units("c01", f"residual {which}")
@@ -311,8 +305,7 @@ def test_residual_curve_measured_less_predicted() -> None:
 
 
 @pytest.mark.parametrize("recording", ["c01", "c02"])
-def test_marks_stand_contact_begins_jumps(recording: str) -> None:
-    """Marks stand where contact begins and where it jumps and samples there are kept."""
+def test_marks_stand_where_contact_begins_and_where_it_jumps_and_samples_there_are_kept(recording: str) -> None:
     document, truth = adhesive_curves()
     (entry,) = [one for one in document["recordings"] if one["id"] == recording]
     said = re.search(r"as recorded: (\S+) mm", trace_of(recording, "contact point after").hovertemplate)

@@ -39,11 +39,8 @@ def planned(made: Campaign, folder: Path, *limits: str) -> dict[str, Any]:
     return dict(json.loads(result.stdout))
 
 
-def test_plan_keeps_within_limits_names(narrow: Campaign, tmp_path: Path) -> None:
-    """A plan keeps within the limits and names all that it separates.
-
-    A place that no sensor allows, 60 mm beside it, is not asked for.
-    """
+def test_a_plan_keeps_within_the_limits_and_names_all_that_it_separates(narrow: Campaign, tmp_path: Path) -> None:
+    """A place that no sensor allows, 60 mm beside it, is not asked for."""
     spheres = ["--indenter-radius-mm", "4", "--indenter-radius-mm", "8"]
     places = ["--offset-mm", "0", "--offset-mm", "60"]
     plan = planned(narrow, tmp_path, "--preload-n", "0.3", "2.5", "--recordings", "5", *spheres, *places)

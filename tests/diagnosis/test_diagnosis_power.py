@@ -57,8 +57,7 @@ def test_three_times_visible_seen_third(least: dict[str, float], table: SigmaTab
             assert (report["verdict"] != "no_mismatch") is seen
 
 
-def test_recordings_less_scatter_show(least: dict[str, float], table: SigmaTable) -> None:
-    """More recordings and less scatter show more."""
+def test_more_recordings_and_less_scatter_show_more(least: dict[str, float], table: SigmaTable) -> None:
     many, rough = (
         visible(lean_report(campaign(made, table), table, *FEW))
         for made in (replace(QUIET, repeats=8), replace(QUIET, gain=0.05, line=0.02))
@@ -70,8 +69,7 @@ def test_recordings_less_scatter_show(least: dict[str, float], table: SigmaTable
     assert many["timing_delay"] == pytest.approx(least["timing_delay"] / 2, rel=0.2)  # four times as many recordings
 
 
-def test_quiet_report_says_shown(table: SigmaTable) -> None:
-    """A quiet report says what would have shown."""
+def test_a_quiet_report_says_what_would_have_shown(table: SigmaTable) -> None:
     report = whole_report(campaign(QUIET, table), table)
     known = sum("frf" in mechanism.kinds for mechanism in CATALOGUE.values())
     small = {name for name, percent in visible(report).items() if percent <= 5.0}

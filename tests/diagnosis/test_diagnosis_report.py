@@ -24,9 +24,7 @@ SHARED = os.environ.get("UNDERSKIN_CAMPAIGNS")
 SENSORS = Made(sensors=3, repeats=2)
 
 
-def test_diagnosis_leaves_no_campaign_memory(table: SigmaTable) -> None:
-    """A diagnosis leaves no campaign in memory."""
-
+def test_a_diagnosis_leaves_no_campaign_in_memory(table: SigmaTable) -> None:
     def kept() -> int:
         gc.collect()
         return sum(isinstance(entry, Campaign) for entry in gc.get_objects())
@@ -36,15 +34,13 @@ def test_diagnosis_leaves_no_campaign_memory(table: SigmaTable) -> None:
     assert kept() == before
 
 
-def test_mechanism_leave_out_not_known_named(table: SigmaTable) -> None:
-    """A mechanism to leave out that is not known is named."""
+def test_a_mechanism_to_leave_out_that_is_not_known_is_named(table: SigmaTable) -> None:
     with pytest.raises(underskin.InvalidInput, match="without"):
         underskin.diagnose(campaign(SENSORS, table), table, without=["gravity"])
 
 
 @pytest.mark.slow
-def test_nothing_found_nothing_missing(table: SigmaTable) -> None:
-    """Nothing is found where nothing is missing."""
+def test_nothing_is_found_where_nothing_is_missing(table: SigmaTable) -> None:
     report = whole_report(campaign(SENSORS, table), table)
     assert report["verdict"] == "no_mismatch"
     assert report["mechanisms"] == []
@@ -60,8 +56,7 @@ def test_nothing_found_nothing_missing(table: SigmaTable) -> None:
 
 
 @pytest.mark.slow
-def test_no_name_declared_unexplained_described(table: SigmaTable) -> None:
-    """What has no name is declared unexplained and described."""
+def test_what_has_no_name_is_declared_unexplained_and_described(table: SigmaTable) -> None:
     whole = campaign(replace(SENSORS, lines=40), table)
     notched = []
     for entry in frf_recordings(whole):
@@ -102,8 +97,7 @@ def test_few_recordings_or_one_line_never_crash(count: int, lines: int, table: S
 
 
 @pytest.mark.slow
-def test_command_writes_report_readable_file(tmp_path: Path, table: SigmaTable) -> None:
-    """The command writes a report for each readable file."""
+def test_the_command_writes_a_report_for_each_readable_file(tmp_path: Path, table: SigmaTable) -> None:
     good, bad = tmp_path / "palm.json", tmp_path / "torn.json"
     good.write_text(json.dumps(to_dict(campaign(SENSORS, table))), encoding="utf-8")
     bad.write_text("{", encoding="utf-8")
@@ -118,8 +112,7 @@ def test_command_writes_report_readable_file(tmp_path: Path, table: SigmaTable) 
     assert [file.name for file in (tmp_path / "reports").iterdir()] == ["palm.json"]
 
 
-def test_campaigns_name_told(tmp_path: Path) -> None:
-    """Campaigns of one name are told what to do."""
+def test_campaigns_of_one_name_are_told_what_to_do(tmp_path: Path) -> None:
     files = [tmp_path / folder / "campaign.json" for folder in ("monday", "tuesday")]
     asked = ["diagnose", *map(str, files), "--campaign", "campaign", "--output-dir", str(tmp_path / "reports")]
     result = CliRunner(env={"COLUMNS": "400"}).invoke(app, asked)

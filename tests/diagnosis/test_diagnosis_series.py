@@ -45,11 +45,8 @@ FIELDS = ("sample_rate_hz", "charge_pc", "preload_n", "force_n", "dynamic_force_
 
 
 @pytest.mark.parametrize("field", first(3, FIELDS))
-def test_slip_recording_named(field: str, quiet: Campaign, table: SigmaTable) -> None:
-    """A slip of one recording and of all is named.
-
-    One is left out. A charge of all in other units only scales d33; of other fields nothing is concluded.
-    """
+def test_a_slip_of_one_recording_and_of_all_is_named(field: str, quiet: Campaign, table: SigmaTable) -> None:
+    """One is left out. A charge of all in other units only scales d33; of other fields nothing is concluded."""
     factor = 1e-3 if field == "preload_n" else 1e3
     one = looked_at(times(quiet, field, factor, "r003"), table)
     assert codes(one) == {("units_off_by_1000", "r003", field)}
@@ -59,11 +56,8 @@ def test_slip_recording_named(field: str, quiet: Campaign, table: SigmaTable) ->
     assert (every["verdict"] == "insufficient_data") == (field != "charge_pc")
 
 
-def test_force_without_mean_told_oscillation(quiet: Campaign, table: SigmaTable) -> None:
-    """A force without its mean is told by its oscillation.
-
-    A piezoelectric force cell shows no preload.
-    """
+def test_a_force_without_its_mean_is_told_by_its_oscillation(quiet: Campaign, table: SigmaTable) -> None:
+    """A piezoelectric force cell shows no preload."""
     coupled = forces(quiet, force_n=lambda entry: entry.force_n - entry.force_n.mean())
     assert codes(looked_at(coupled, table)) == set()
     report = looked_at(times(coupled, "force_n", 1e3), table)
@@ -103,10 +97,9 @@ def relaxing(quiet: Campaign) -> Campaign:
 
 
 @pytest.mark.parametrize("excited", [struck, relaxing])
-def test_neither_blow_nor_drift_force_slip(
+def test_neither_a_blow_nor_drift_of_the_force_is_a_slip(
     excited: Callable[[Campaign], Campaign], quiet: Campaign, table: SigmaTable
 ) -> None:
-    """Neither a blow nor drift of the force is a slip."""
     right = excited(quiet)
     assert "units_off_by_1000" not in {code for code, _, _ in codes(looked_at(right, table))}
     report = looked_at(times(right, "force_n", 1e-3), table)
@@ -114,8 +107,7 @@ def test_neither_blow_nor_drift_force_slip(
     assert report["verdict"] == "insufficient_data"
 
 
-def test_force_said_right_used(quiet: Campaign, table: SigmaTable) -> None:
-    """A force said to be right is used all the same."""
+def test_a_force_said_to_be_right_is_used_all_the_same(quiet: Campaign, table: SigmaTable) -> None:
     slipped = times(quiet, "dynamic_force_n", 1e-3)
     assert looked_at(slipped, table)["verdict"] == "insufficient_data"
     meant = looked_at(replace(slipped, units_checked=True), table)
@@ -212,11 +204,8 @@ def sixteen_times(spectrum: Any) -> Floats:
     return np.tile(np.fft.irfft(np.append(0, spectrum)) * len(spectrum), 16)
 
 
-def test_resonance_multiple_mains_none(quiet: Campaign, table: SigmaTable) -> None:
-    """A resonance on a multiple of the mains is none.
-
-    Its top is off the course of the lines around it, as mains are.
-    """
+def test_a_resonance_on_a_multiple_of_the_mains_is_none(quiet: Campaign, table: SigmaTable) -> None:
+    """Its top is off the course of the lines around it, as mains are."""
     line = 4.0 * np.arange(1, 257)
     response = 1.0 / (1 - (line / 300.0) ** 2 + 0.06j * line / 300.0)
 
@@ -244,11 +233,8 @@ def require_high_pass(campaign: Campaign, table: SigmaTable, within: float) -> d
 HIGH_PASS = {"amplifier_high_pass": {"corner_hz": 1.0}}
 
 
-def test_recordings_different_drives_rates(table: SigmaTable) -> None:
-    """Recordings of different drives rates and lengths go together.
-
-    And FRFs with time series.
-    """
+def test_recordings_of_different_drives_rates_and_lengths_go_together(table: SigmaTable) -> None:
+    """And FRFs with time series."""
     drives = [
         {"kind": "sweep", "sample_rate_hz": 1024.0, "duration_s": 8.0},
         {"kind": "random", "sample_rate_hz": 512.0, "duration_s": 16.0},
@@ -262,11 +248,8 @@ def test_recordings_different_drives_rates(table: SigmaTable) -> None:
     require_high_pass(replace(campaigns[0], recordings=mixed), table, 0.02)
 
 
-def test_single_sweep_high_pass_still_found(quiet: Campaign, table: SigmaTable) -> None:
-    """Of a single sweep a high pass is still found.
-
-    It has each line in one block alone, whose ends cut it: the lowest lines would say more than a high-pass.
-    """
+def test_of_a_single_sweep_a_high_pass_is_still_found(quiet: Campaign, table: SigmaTable) -> None:
+    """It has each line in one block alone, whose ends cut it: the lowest lines would say more than a high-pass."""
     time = np.arange(16 * 1024) / 1024.0
     force = 0.09 * np.sin(2 * np.pi * (1.0 + 0.5 * 129.0 / 16.0 * time) * time)
     decay = np.exp(-2 * np.pi / 1024.0)

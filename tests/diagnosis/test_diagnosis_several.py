@@ -132,6 +132,42 @@ def test_half_of_four_sensors_change(table: SigmaTable, *, is_exchange: bool) ->
         assert row["high"] / row["low"] >= 0.99 * row["relative"]["high"] / row["relative"]["low"]
 
 
+def parts_of(campaign: Campaign, field: str) -> list[Campaign]:
+    """A file for each value of a field of its recordings, which knows its own sensors only."""
+    parts: dict[Any, list[Any]] = {}
+    for entry in frf_recordings(campaign):
+        parts.setdefault(getattr(entry, field), []).append(entry)
+    files = []
+    for value, entries in parts.items():
+        own = {entry.sensor for entry in entries}
+        skin = replace(campaign.skin, sensors=tuple(one for one in campaign.skin.sensors if one.id in own))
+        files.append(Campaign(f"{campaign.name} {value}", skin, tuple(entries)))
+    return files
+
+
+def unlike(campaign: Campaign) -> Campaign:
+    return with_gain(campaign, s01=1.1, s02=0.8, s03=1.25, s04=0.9, s05=1.3, s06=0.75)
+
+
+@pytest.mark.parametrize("field", ["sensor", "preload_n", "id"])
+def test_parts_are_one_campaign(table: SigmaTable, field: str) -> None:
+    """Files of a sensor, a preload or a press each are one campaign: how sensors differ shows between them."""
+    files = parts_of(unlike(made("may")), field)
+    report = reported(files, table)
+    assert report["campaigns"] == [file.name for file in files]
+    assert report["verdict"] == "explained"
+    assert [entry["name"] for entry in report["mechanisms"]] == ["sensor_spread"]
+
+
+def test_parts_of_two_dates_are_two_campaigns(table: SigmaTable) -> None:
+    """Files of a sensor each, of two dates, are put together by date: a sensor that fell between them is named."""
+    before, after = map(unlike, dates())
+    files = [*parts_of(with_gain(after, s03=0.75), "sensor"), *parts_of(before, "sensor")]
+    report = reported(files, table)
+    assert report["campaigns"] == ["may s01 and 7 more", "september s01 and 7 more"]
+    assert "d33 of sensor s03, beyond the others, fell by" in report["statement"]
+
+
 def silent(campaign: Campaign, sensor: str, seed: int) -> Campaign:
     """With nothing but noise of 0.03 pC/N in one channel."""
     generator = np.random.default_rng(seed)

@@ -67,11 +67,8 @@ def test_conjugated_frfs_are_put_right(mechanism: str, parameters: tuple[float, 
     assert ("either the FRFs are conjugated" in statement) == (mechanism == "timing_delay")
 
 
-def test_no_phase_nothing_said(good: Campaign, table: SigmaTable) -> None:
-    """Where there is no phase nothing is said of it.
-
-    Nor where each recording has one of its own, some milliradians, of either sign.
-    """
+def test_where_there_is_no_phase_nothing_is_said_of_it(good: Campaign, table: SigmaTable) -> None:
+    """Nor where each recording has one of its own, some milliradians, of either sign."""
     assert named(changed(good, lambda entry, _: times(entry, 1.0, -1.0)), table) == []
     exact = campaign(replace(MADE, line=0.002), table)
     phase = np.exp(0.004j * np.random.default_rng(1).normal(size=len(exact.recordings)))
@@ -104,11 +101,8 @@ def test_what_leads_by_nature_is_not_conjugated(table: SigmaTable) -> None:
         assert "conjugated" not in named(changed(wide, change), table)
 
 
-def test_lag_force_channel_beside_high_pass(table: SigmaTable) -> None:
-    """A lag of the force channel beside a high pass is no other convention.
-
-    The high pass tells that the phase is as it should be; conjugated, it tells that it is not.
-    """
+def test_a_lag_of_the_force_channel_beside_a_high_pass_is_no_other_convention(table: SigmaTable) -> None:
+    """The high pass tells that the phase is as it should be; conjugated, it tells that it is not."""
     wide = campaign(replace(MADE, repeats=1, highest_hz=1000.0), table)
 
     def lagging(entry: FrfRecording, _: int) -> FrfRecording:
@@ -158,8 +152,7 @@ def test_two_ranges_leave_d33_open(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize(("share", "word"), first(2, [(0.75, "weak"), (2.0, "strong"), (1.35, "strong")]))
-def test_sensor_stands_alone_fault_no_physics(share: float, word: str, table: SigmaTable) -> None:
-    """A sensor that stands alone is its own fault and no physics."""
+def test_a_sensor_that_stands_alone_is_its_own_fault_and_no_physics(share: float, word: str, table: SigmaTable) -> None:
     six = campaign(Made(sensors=6), table)
     report = looked_at(changed(six, lambda entry, _: times(entry, share if entry.sensor == "s3" else 1.0)), table)
     ((code, statement),) = slips(report)
@@ -173,11 +166,8 @@ def test_sensor_stands_alone_fault_no_physics(share: float, word: str, table: Si
     assert report["d33"]["low"] < 15.0 < report["d33"]["high"]
 
 
-def test_sensors_differ_none_stands_alone(table: SigmaTable) -> None:
-    """Of sensors that all differ none stands alone.
-
-    A spread of 15 %, as poled films have, in skins of six sensors.
-    """
+def test_of_sensors_that_all_differ_none_stands_alone(table: SigmaTable) -> None:
+    """A spread of 15 %, as poled films have, in skins of six sensors."""
     six = campaign(Made(sensors=6), table)
     for seed in first(1, range(12)):
         gains = np.exp(0.15 * np.random.default_rng(seed).normal(size=6))
@@ -187,8 +177,7 @@ def test_sensors_differ_none_stands_alone(table: SigmaTable) -> None:
 @pytest.mark.parametrize(
     ("factor", "meant"), first(2, [(2.0, "peak-to-peak"), (0.5**0.5, "rms"), (0.5, "peak-to-peak"), (2**0.5, "rms")])
 )
-def test_amplitudes_kind_put_right(factor: float, meant: str, good: Campaign, table: SigmaTable) -> None:
-    """Amplitudes of another kind are put right."""
+def test_amplitudes_of_another_kind_are_put_right(factor: float, meant: str, good: Campaign, table: SigmaTable) -> None:
     report = looked_at(changed(good, by(a_third(len(good.recordings), factor))), table)
     ((code, statement),) = slips(report)
     assert code == "gain_steps"
@@ -221,11 +210,8 @@ def test_kind_amplitude_told_beside_scatter(seed: int, number: int, factor: floa
 
 
 @pytest.mark.parametrize("number", first(1, [274, 297]))
-def test_presses_miss_place_no_factor(number: int, table: SigmaTable) -> None:
-    """Presses that miss their place are no factor.
-
-    One sensor, presses beside it that scatter by 0.45 mm: such a miss lowers the level, some by half and more.
-    """
+def test_presses_that_miss_their_place_are_no_factor(number: int, table: SigmaTable) -> None:
+    """One sensor, presses beside it that scatter by 0.45 mm: such a miss lowers the level, some by half and more."""
     description = drawn(961377, number, "none")
     description["noise"]["position_mm"] = 0.45
     made, _ = from_dict(recorded_campaign(record(description)))
@@ -261,8 +247,7 @@ def test_a_warm_up_is_left_out(amplitude: float, good: Campaign, table: SigmaTab
     assert report["d33"]["low"] < 15.0 < report["d33"]["high"]
 
 
-def test_warm_up_told_few_recordings_no_drift(good: Campaign, table: SigmaTable) -> None:
-    """A warm up is told of few recordings and no drift of a few percent."""
+def test_a_warm_up_is_told_of_few_recordings_and_no_drift_of_a_few_percent(good: Campaign, table: SigmaTable) -> None:
     made = shuffled(good)
     for count, recordings in ((6, 1.5), (10, 2.0)):
         few = replace(made, recordings=made.recordings[:count])
@@ -281,11 +266,8 @@ def quiet_of_rig(seed: int, numbers: int, hidden: str, least: int) -> list[Campa
 
 
 @pytest.mark.soak
-def test_warm_up_told_mechanisms_move_levels(table: SigmaTable) -> None:
-    """A warm up is told from mechanisms that move the levels.
-
-    Of campaigns that hide a mechanism of contact.
-    """
+def test_a_warm_up_is_told_from_mechanisms_that_move_the_levels(table: SigmaTable) -> None:
+    """Of campaigns that hide a mechanism of contact."""
     moving = ("contact_creep", "misalignment", "layered_contact", "moving_contact_edge")
     every = quiet_of_rig(938002, 70, "single", 12)
     assert not any("warm_up" in named(made, table, *moving) for made in every)

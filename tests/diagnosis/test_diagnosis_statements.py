@@ -38,11 +38,8 @@ def with_slips(table: SigmaTable) -> Iterator[dict[str, Any]]:
             yield lean_report(wrong.campaign, table, *beside(*description["effects"], "sensor_spread"))
 
 
-def test_slip_decides_comes_before_verdict(table: SigmaTable) -> None:
-    """A slip that decides comes before the verdict.
-
-    In few sentences all the same, as `lean_report` holds every report to.
-    """
+def test_a_slip_that_decides_comes_before_the_verdict(table: SigmaTable) -> None:
+    """In few sentences all the same, as `lean_report` holds every report to."""
     begun = [report for report in with_slips(table) if report["verdict"] != "insufficient_data"]
     decided = [report for report in begun if "apart from that, " in sentences(report["statement"])[0]]
     assert len(decided) >= 2
@@ -68,8 +65,7 @@ def test_what_keeps_an_axis_undecidable_is_named(table: SigmaTable) -> None:
     assert "whether it depends on" in report["location"]["statement"]
 
 
-def test_mechanism_set_part_misfit(table: SigmaTable) -> None:
-    """Each mechanism of a set has its own part of the misfit."""
+def test_each_mechanism_of_a_set_has_its_own_part_of_the_misfit(table: SigmaTable) -> None:
     made = Made(("ageing", "amplifier_high_pass"), (0.3, 300.0, 0.0, 0.3, 1.0))
     report = lean_report(campaign(made, table), table, *beside(*made.mechanisms, "timing_delay", "thickness_error"))
     parts = {entry["name"]: entry["explains_percent"] for entry in report["mechanisms"]}
@@ -84,8 +80,7 @@ def ageing(table: SigmaTable) -> dict[str, Any]:
     return lean_report(made, table, *beside("ageing", "preload_dependent_d33", "sensor_spread", "thickness_error"))
 
 
-def test_probability_never_certain_everywhere(ageing: dict[str, Any]) -> None:
-    """A probability is never certain and the same everywhere."""
+def test_a_probability_is_never_certain_and_the_same_everywhere(ageing: dict[str, Any]) -> None:
     assert ageing["verdict"] == "explained"
     assert ageing["probability"] == 0.985
     assert ageing["alternatives"][0]["mechanisms"] == ["none_of_these"]
@@ -95,8 +90,7 @@ def test_probability_never_certain_everywhere(ageing: dict[str, Any]) -> None:
     assert any(re.fullmatch(numbers, entry["why_not"]) for entry in ageing["alternatives"][1:])
 
 
-def test_sentences_plain_hold_no_statistics(ageing: dict[str, Any]) -> None:
-    """Sentences are plain and hold no statistics."""
+def test_sentences_are_plain_and_hold_no_statistics(ageing: dict[str, Any]) -> None:
     assert "recordings after many load cycles are lower" in ageing["statement"]
     texts = [ageing["statement"], ageing["location"]["statement"]]
     texts += [entry["why_not"] for entry in ageing["alternatives"]]

@@ -57,11 +57,8 @@ def pdms_curve(
     return Campaign("pdms", SkinDescription(poisson_ratio=0.5), (recording,), units_checked=True)
 
 
-def test_raw_curve_snap_pull_off_no_clear(table: SigmaTable) -> None:
-    """A raw curve with snap in and pull off is no all clear.
-
-    Hertz's law under an error of hundreds of per cent was said to agree within the noise.
-    """
+def test_a_raw_curve_with_snap_in_and_pull_off_is_no_all_clear(table: SigmaTable) -> None:
+    """Hertz's law under an error of hundreds of per cent was said to agree within the noise."""
     report = lean_report(pdms_curve(), table, *beside("adhesion"))
     assert report["verdict"] != "no_mismatch"
     shares = {tuple(entry["mechanisms"]): entry["probability"] for entry in report["alternatives"]}
@@ -116,11 +113,8 @@ def test_mains_told_however_wide_lines(shape: str, width_hz: float, share: float
         assert found["parameters"][1]["value"] == pytest.approx(width_hz, rel=0.35)
 
 
-def test_example_explained_heavy_tip(table: SigmaTable) -> None:
-    """The example is explained by its heavy tip.
-
-    As docs/tour.md has it, and so it can be adopted.
-    """
+def test_the_example_is_explained_by_its_heavy_tip(table: SigmaTable) -> None:
+    """As docs/tour.md has it, and so it can be adopted."""
     from docs.tour.steps import VERDICT
 
     report = whole_report(read_file(EXAMPLE, EXAMPLE.name).campaign, table)
@@ -136,11 +130,8 @@ def test_example_explained_heavy_tip(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize("tip_mass_g", first(1, [1500.0, 300.0]))
-def test_recording_above_resonance_not_reversed(tip_mass_g: float, table: SigmaTable) -> None:
-    """A recording above its resonance is not reversed.
-
-    In antiphase with force over most of its lines, with the heavier tip in all recordings.
-    """
+def test_a_recording_above_its_resonance_is_not_reversed(tip_mass_g: float, table: SigmaTable) -> None:
+    """In antiphase with force over most of its lines, with the heavier tip in all recordings."""
     three = Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40, highest_hz=1000.0)
     made = campaign(replace(three, mechanisms=("contact_resonance",), parameters=(tip_mass_g, 0.05)), table)
     assert min(float(np.median(np.asarray(entry.frf_re_pc_per_n))) for entry in frf_recordings(made)) < 0
@@ -157,11 +148,8 @@ def test_recordings_of_noise_tell_nothing(table: SigmaTable) -> None:
     assert "above its noise" in report["statement"]
 
 
-def test_noise_floor_counts_positioning_scatter(table: SigmaTable) -> None:
-    """The noise floor counts positioning scatter of centred presses.
-
-    A press on its sensor's centre feels it in second order: errors looked far above a floor that left that out.
-    """
+def test_the_noise_floor_counts_positioning_scatter_of_centred_presses(table: SigmaTable) -> None:
+    """A press on its sensor's centre feels it in second order: errors looked far above a floor that left that out."""
     centred, _ = from_dict(rig_campaign(record(drawn(20261122, 1, "none"))))
     report = lean_report(centred, table, *DECLARED)
     assert report["verdict"] == "no_mismatch"
@@ -171,11 +159,8 @@ def test_noise_floor_counts_positioning_scatter(table: SigmaTable) -> None:
     assert fit["after"]["heldout_rmse_percent"] == pytest.approx(fit["noise_floor_percent"], rel=0.2)
 
 
-def test_several_answers_left_d33_averaged_none(table: SigmaTable) -> None:
-    """Where several answers are left their d33 are averaged and none is to be quoted.
-
-    E declared three times too small, one sphere and few preloads: E and what acts like it are not told apart.
-    """
+def test_where_several_answers_are_left_their_d33_are_averaged_and_none_is_to_be_quoted(table: SigmaTable) -> None:
+    """E declared three times too small, one sphere and few preloads: E and what acts like it are not told apart."""
     made = campaign(Made(preloads_n=(0.5, 1.0, 2.0), spheres_mm=(10.0,), modulus_mpa=8.0), table)
     wrong = replace(made, skin=replace(made.skin, youngs_modulus_mpa=8.0 / 3))
     report = lean_report(wrong, table, *(name for name in DECLARED if name != "moving_contact_edge"))
@@ -185,8 +170,7 @@ def test_several_answers_left_d33_averaged_none(table: SigmaTable) -> None:
         assert not report["d33"]["quotable"]
 
 
-def test_d33_pvdf_cannot_called(table: SigmaTable) -> None:
-    """A d33 that pvdf cannot have is called so."""
+def test_a_d33_that_pvdf_cannot_have_is_called_so(table: SigmaTable) -> None:
     report = looked_at(campaign(Made(d33_pc_per_n=400.0), table), table)
     assert report["verdict"] == "no_mismatch"
     (finding,) = (entry for entry in report["findings"] if entry["code"] == "implausible_d33")
@@ -230,8 +214,7 @@ def test_each_dead_sensor_is_named(table: SigmaTable) -> None:
     assert "further findings: 2 of no response" in report["statement"]
 
 
-def test_left_out_explained_campaign_stands_head(table: SigmaTable) -> None:
-    """What is left out of an explained campaign stands at the head of its statement."""
+def test_what_is_left_out_of_an_explained_campaign_stands_at_the_head_of_its_statement(table: SigmaTable) -> None:
     made = campaign(Made(mechanisms=("contact_resonance",), parameters=(40.0, 0.05), highest_hz=400.0, lines=40), table)
     silent = replace(frf_recordings(made)[0], frf_re_pc_per_n=np.zeros(40), frf_im_pc_per_n=np.zeros(40))
     report = lean_report(replace(made, recordings=(silent, *made.recordings[1:])), table, *OF_LINES)

@@ -82,8 +82,7 @@ def warming_report(warming: Campaign, table: SigmaTable) -> dict[str, Any]:
 
 
 @pytest.mark.soak
-def test_column_lab_added_gain_follows(warming_report: dict[str, Any]) -> None:
-    """A column that the lab added is what the gain follows."""
+def test_a_column_that_the_lab_added_is_what_the_gain_follows(warming_report: dict[str, Any]) -> None:
     law = warming_report["unnamed"]
     assert warming_report["verdict"] == "unexplained"
     assert warming_report["mechanisms"] == []
@@ -119,11 +118,8 @@ def test_plan_compare_ends_law_changes_charge(warming: Campaign, warming_report:
     assert 22 <= int(told[1]) <= 32
 
 
-def test_cause_told_order_alone_followed(quiet: Campaign, table: SigmaTable) -> None:
-    """A cause is told where the order alone can be followed.
-
-    Where load cycles and times follow the order as well, each has another cause, and none holds four fifths.
-    """
+def test_a_cause_is_told_where_the_order_alone_can_be_followed(quiet: Campaign, table: SigmaTable) -> None:
+    """Where load cycles and times follow the order as well, each has another cause, and none holds four fifths."""
     step = changed(quiet, lambda _, number, __: 1.6 if number >= 30 else 1.0)
     entries = [replace(entry, load_cycles=None, recorded_at=None) for entry in frf_recordings(step)]
     found = reported(replace(step, recordings=tuple(entries)), table)
@@ -151,9 +147,7 @@ def test_followed_order_confirmed_repeating(quiet: Campaign, table: SigmaTable) 
     assert {"order", "recorded_at"}.isdisjoint(planned["recordings"][0])
 
 
-def test_resonance_frame_peak_over_frequency(quiet: Campaign, table: SigmaTable) -> None:
-    """A resonance of the frame is a peak over frequency."""
-
+def test_a_resonance_of_the_frame_is_a_peak_over_frequency(quiet: Campaign, table: SigmaTable) -> None:
     def frame(_: FrfRecording, __: int, frequency: Floats) -> Complexes:
         u = frequency / 150.0
         return np.asarray(1 + 0.1 * u**2 / (1 - u**2 + 0.1j * u))
@@ -165,8 +159,7 @@ def test_resonance_frame_peak_over_frequency(quiet: Campaign, table: SigmaTable)
     assert values["damping"]["value"] == pytest.approx(0.05, rel=0.2)
 
 
-def test_loss_follows_amplitude_lag(table: SigmaTable) -> None:
-    """A loss that follows the amplitude is a lag."""
+def test_a_loss_that_follows_the_amplitude_is_a_lag(table: SigmaTable) -> None:
     made = campaign(Made(sensors=3, dynamic_forces_n=(0.03, 0.06, 0.12), lines=16), table)
     report = reported(changed(made, lambda entry, _, __: complex(np.exp(-2j * entry.dynamic_force_n))), table)
     acts_on, axis, form = law_of(report)
@@ -234,8 +227,7 @@ def test_shares_among_laws_course_no_form(table: SigmaTable) -> None:
     assert "more probable still is a course of no listed form" in found["statement"]
 
 
-def test_high_pass_order_said(quiet: Campaign, table: SigmaTable) -> None:
-    """A high pass of another order is said to be one."""
+def test_a_high_pass_of_another_order_is_said_to_be_one(quiet: Campaign, table: SigmaTable) -> None:
     report = reported(changed(quiet, lambda _, __, hz: np.asarray((1 / (1 - 2j / hz)) ** 0.4, complex)), table)
     law = report["unnamed"]
     assert law_of(report) == ("frequency_response", "frequency_hz", "threshold")
@@ -260,11 +252,8 @@ def test_contact_grows_power_force_hertz_s(
     assert "in place of 1/3" in report["statement"]
 
 
-def test_constant_phase_beside_weak_sensors_told(table: SigmaTable) -> None:
-    """A constant phase beside weak sensors is told apart from them.
-
-    Two sensors of six that lost a fifth and two fifths, and all FRFs turned by the same angle.
-    """
+def test_a_constant_phase_beside_weak_sensors_is_told_apart_from_them(table: SigmaTable) -> None:
+    """Two sensors of six that lost a fifth and two fifths, and all FRFs turned by the same angle."""
     made = campaign(Made(sensors=6, gain=0.01, line=0.005, highest_hz=800.0), table)
     kept = {"s2": 0.8, "s4": 0.6}
     phase = np.exp(-1j * np.radians(1.2))
@@ -289,13 +278,10 @@ RIG: list[tuple[dict[str, Any], tuple[str, str, str], dict[str, float]]] = [
 
 
 @pytest.mark.parametrize(("effects", "law", "values"), first(1, RIG))
-def test_rig_hides_order_recordings_found(
+def test_what_the_rig_hides_in_the_order_of_recordings_is_found(
     effects: dict[str, Any], law: tuple[str, str, str], values: dict[str, float], table: SigmaTable
 ) -> None:
-    """What the rig hides in the order of recordings is found.
-
-    A place that runs round is a periodic place; what remembers the preload before follows that.
-    """
+    """A place that runs round is a periodic place; what remembers the preload before follows that."""
     report = rig_report(table, effects, *FEW)
     assert all(wanted in ("", found) for found, wanted in zip(law_of(report), law, strict=True))
     told = {entry["name"]: entry["value"] for entry in report["unnamed"]["parameters"]}

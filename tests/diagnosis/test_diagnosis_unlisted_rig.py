@@ -31,8 +31,7 @@ def report_on(name: str, table: SigmaTable) -> dict[str, Any]:
 
 @pytest.mark.soak
 @needs_campaigns
-def test_laws_independent_rig_found_predict_held(table: SigmaTable) -> None:
-    """Most laws of an independent rig are found and predict what was held out."""
+def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out(table: SigmaTable) -> None:
     truths = [entry for entry in json.loads((SHARED / TRUTH).read_text()).items() if entry[1]["identifiable"]]
     right, shares = 0, []
     for name, truth in (tried := first(5, truths)):

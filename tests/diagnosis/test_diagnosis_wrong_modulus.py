@@ -80,11 +80,8 @@ def test_campaign_no_contact_lies(table: SigmaTable) -> None:
     assert "contacts_kept" in codes(report)
 
 
-def test_modulus_right_contacts_beyond_tables(table: SigmaTable) -> None:
-    """Where the modulus is right contacts beyond the tables are left out.
-
-    L up to 0.17, as declared: no answer that stands brings these within.
-    """
+def test_where_the_modulus_is_right_contacts_beyond_the_tables_are_left_out(table: SigmaTable) -> None:
+    """L up to 0.17, as declared: no answer that stands brings these within."""
     made = campaign(replace(WIDE, preloads_n=(0.25, 0.5, 1.0, 3.2)), table)
     report = lean_report(made, table, *FEW)
     assert report["verdict"] == "no_mismatch"
@@ -95,11 +92,8 @@ def test_modulus_right_contacts_beyond_tables(table: SigmaTable) -> None:
     assert "contacts_kept" not in codes(report)
 
 
-def test_layered_contact_keeps_hertz_puts(table: SigmaTable) -> None:
-    """A layered contact keeps what hertz puts beyond the tables.
-
-    Hertz' a/h of 4.4 N under 16 mm is 3.2 here; the layer's own contact is narrower.
-    """
+def test_a_layered_contact_keeps_what_hertz_puts_beyond_the_tables(table: SigmaTable) -> None:
+    """Hertz' a/h of 4.4 N under 16 mm is 3.2 here; the layer's own contact is narrower."""
     layered = Made(
         mechanisms=("layered_contact",),
         modulus_mpa=1.2,

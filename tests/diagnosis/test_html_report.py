@@ -55,8 +55,7 @@ def test_every_text_of_a_campaign_is_escaped() -> None:
     assert "Content-Security-Policy" in shown
 
 
-def test_report_without_answer_says_lacking() -> None:
-    """A report without an answer says what is lacking."""
+def test_a_report_without_an_answer_says_what_is_lacking() -> None:
     shown = body_of(EMPTY, {})
     assert re.findall("<h2>(.*?)</h2>", shown) == [WHERE, "What to measure next"]
     assert texts(shown) == (
@@ -66,8 +65,7 @@ def test_report_without_answer_says_lacking() -> None:
     assert texts(provenance(EMPTY)) == "Made with underskin 1 tables sigma ab"
 
 
-def test_plan_table_fields_recordings() -> None:
-    """A plan is a table of the fields that its recordings have."""
+def test_a_plan_is_a_table_of_the_fields_that_its_recordings_have() -> None:
     planned = {
         "recordings": [{"sensor": "=s1", "preload_n": 2.0, "position_mm": [1.0, 2.5]}],
         "statement": "One recording.",

@@ -18,8 +18,7 @@ pytestmark = pytest.mark.soak  # as all that the paper needs
 PAPER_LENGTH, PAPER_WIDTH = 16.0, 8.0  # 40 mm and 20 mm in units of 2.5 mm
 
 
-def test_deep_layer_lies_layer_half_space() -> None:
-    """The deep layer lies between the layer and the half space."""
+def test_the_deep_layer_lies_between_the_layer_and_the_half_space() -> None:
     np.testing.assert_allclose(deep_layer.sigma(1.0, A, RHO), linear_layer.sigma(A, RHO), rtol=1e-9)
     np.testing.assert_allclose(deep_layer.sigma(200.0, A, RHO), half_space.sigma(A, RHO), rtol=1e-4)
 
@@ -30,11 +29,8 @@ def test_a_slippery_base_transmits_as_tabulated() -> None:
     assert deep_layer.sigma(1.0, 0.0, np.array([0.6])) == pytest.approx([0.9882], abs=5e-5)
 
 
-def test_half_spaces_error_falls_depth_base() -> None:
-    """The half spaces error falls with the depth of the base.
-
-    −34.7 %, −7.8 %, −0.7 % and −0.01 % with the base at h, 2h, 4h and 12h.
-    """
+def test_the_half_spaces_error_falls_with_the_depth_of_the_base() -> None:
+    """−34.7 %, −7.8 %, −0.7 % and −0.01 % with the base at h, 2h, 4h and 12h."""
     endless = np.array([deep_layer.sigma(depth, A, RHO)[1] for depth in (1.0, 2.0, 4.0, 12.0)])
     percent = 100 * (half_space.sigma(A, RHO[1]) / endless - 1)
     np.testing.assert_allclose(percent, [-34.7, -7.8, -0.7, -0.01], atol=0.05)
@@ -47,11 +43,8 @@ def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> N
     np.testing.assert_allclose(block.sigma, deep_layer.sigma(depth, A, RHO, bonded=bonded), rtol=1e-5)
 
 
-def test_error_falls_order_elements() -> None:
-    """The error falls with the order of the elements.
-
-    Of a very wide block, which is the endless layer.
-    """
+def test_the_error_falls_with_the_order_of_the_elements() -> None:
+    """Of a very wide block, which is the endless layer."""
     exact = linear_layer.sigma(A, RHO)
     errors = [
         float(np.max(np.abs(solve(FiniteBlock(16.0, 16.0, 1.0), A, RHO, order).sigma / exact - 1))) for order in (4, 5)
@@ -60,8 +53,7 @@ def test_error_falls_order_elements() -> None:
 
 
 @pytest.mark.parametrize("depth", first(1, [1.0, 12.0]))
-def test_papers_block_converges_carries_whole(depth: float) -> None:
-    """The papers block converges and carries the whole force."""
+def test_the_papers_block_converges_and_carries_the_whole_force(depth: float) -> None:
     block = FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, depth)
     coarse, fine = solve(block, A, RHO, order=4), solve(block, A, RHO, order=5)
     assert fine.force == pytest.approx(1.0, abs=1e-8)
@@ -75,21 +67,15 @@ def test_length_and_width_can_be_exchanged() -> None:
     np.testing.assert_allclose(along.sigma, across.sigma, rtol=1e-8)
 
 
-def test_narrow_column_carries_mean_pressure() -> None:
-    """A narrow column carries the mean pressure.
-
-    Saint-Venant: many widths below the load the stress is F over the area, so σ = (2π/3) h²/area.
-    """
+def test_a_narrow_column_carries_the_mean_pressure() -> None:
+    """Saint-Venant: many widths below the load the stress is F over the area, so σ = (2π/3) h²/area."""
     side = 0.25
     column = solve(FiniteBlock(side, side, 2.0), 0.1, np.array([0.0, 0.1]), order=4)
     np.testing.assert_allclose(column.sigma, 2 * np.pi / 3 / side**2, rtol=1e-6)
 
 
-def test_displacement_under_load_endless_layers() -> None:
-    """The displacement under the load is the endless layers.
-
-    w(0) = F/(4πG) ∫ K(k) J(k) dk in units of h: K the layer's compliance, J the Hertz pressure's transform.
-    """
+def test_the_displacement_under_the_load_is_the_endless_layers() -> None:
+    """w(0) = F/(4πG) ∫ K(k) J(k) dk in units of h: K the layer's compliance, J the Hertz pressure's transform."""
     x, weight = np.polynomial.legendre.leggauss(400)
     k, weight = 200 * (1 + x), 200 * weight
     exact = float(weight @ (Layer().compliance(k).value * hertz_transform(k * A))) / (4 * np.pi)

@@ -15,11 +15,8 @@ def test_a_slender_cylinder_shows_its_modulus() -> None:
     assert excess[1] == pytest.approx(excess[0], rel=0.05)
 
 
-def test_flat_disc_stiff_gent_lindley_say() -> None:
-    """A flat disc is as stiff as gent and lindley say.
-
-    Lubrication between two plates: the parabolic pressure gives 2 S² E where S is large.
-    """
+def test_a_flat_disc_is_as_stiff_as_gent_and_lindley_say() -> None:
+    """Lubrication between two plates: the parabolic pressure gives 2 S² E where S is large."""
     assert stiffness_ratio(1.0, 80.0) == pytest.approx(2 * 20.0**2, rel=0.01)
     assert stiffness_ratio(1.0, 40.0) / gent_lindley(1.0, 40.0) == pytest.approx(1.0, abs=0.01)
 

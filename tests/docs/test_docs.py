@@ -53,11 +53,8 @@ def test_links_and_files_exist(page: Path) -> None:
     assert [name for name in _FILE.findall(prose(page)) if not (ROOT / name).exists()] == []
 
 
-def test_parts_benchmark_said_page() -> None:
-    """Parts of the benchmark that are said to be on a page are.
-
-    A page that leads to validation.md for `python -m bench PART` finds that part there.
-    """
+def test_parts_of_the_benchmark_that_are_said_to_be_on_a_page_are() -> None:
+    """A page that leads to validation.md for `python -m bench PART` finds that part there."""
     validation = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
     for page in PAGES:
         for paragraph in prose(page).split("\n\n"):

@@ -130,8 +130,7 @@ def test_octave_sends_campaigns(store_url: str) -> None:
 
 
 @pytest.mark.parametrize("month", ["05.csv", "06.csv", "07.json", "08.csv", "09.csv"])
-def test_simulated_campaigns_give_back_made(month: str) -> None:
-    """The simulated campaigns give back what they were made with."""
+def test_the_simulated_campaigns_give_back_what_they_were_made_with(month: str) -> None:
     file = EXAMPLES / "campaigns" / f"2017-{month}"
     found = invert(read_file(file, file.name).campaign, load_table())
     d33 = np.array([14.0, 14.4, 13.7 * (1 - 0.08 * (int(month[1]) - 5)), 14.2])
@@ -177,8 +176,7 @@ def test_labview_request_byte_for_byte(server_url: str) -> None:
     assert is_the_answer_shown(answer_body), answer_body
 
 
-def test_labview_without_header_refused_page(server_url: str) -> None:
-    """Labview without the header is refused as the page says."""
+def test_labview_without_the_header_is_refused_as_the_page_says(server_url: str) -> None:
     answer = httpx.post(f"{server_url}/v1/frf", data={"preload_n": "1"})
     assert answer.status_code == 415
     assert "application/json, text/csv, application/x-npz or" in answer.json()["detail"]

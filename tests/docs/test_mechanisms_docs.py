@@ -22,8 +22,7 @@ def test_the_page_is_the_catalogue_s() -> None:
 
 
 @pytest.mark.slow
-def test_mechanism_figure_effect() -> None:
-    """Each mechanism has a figure of an effect."""
+def test_each_mechanism_has_a_figure_of_an_effect() -> None:
     for name in (mechanism.name for mechanism in built_in()):
         assert (DOCS / "figures" / f"mechanism-{name}.svg").exists()
         for panel in panels(name, load_table()):
@@ -43,8 +42,7 @@ def test_figures_come_out_the_same_every_time(tmp_path: Path) -> None:
     assert first == second
 
 
-def test_law_s_curve_gives_constants_back() -> None:
-    """A law s own curve gives its constants back."""
+def test_a_laws_own_curve_gives_its_constants_back() -> None:
     strain = np.linspace(-0.6, -0.01, 60)
     exact = Sample("made", strain, 100 / 3 * yeoh(1 + strain, np.array([0.1, 0.05])))
     found = fit(exact, *LAWS["Yeoh"])
@@ -53,8 +51,7 @@ def test_law_s_curve_gives_constants_back() -> None:
 
 
 @pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS names no folder")
-def test_fits_measured_silicones(tmp_path: Path) -> None:
-    """The fits are those of the measured silicones."""
+def test_the_fits_are_those_of_the_measured_silicones(tmp_path: Path) -> None:
     main(tmp_path / "silicones.json")
     made, kept = (json.loads(path.read_text(encoding="utf-8")) for path in (tmp_path / "silicones.json", RESULTS))
     assert [row["sample"] for row in made] == [row["sample"] for row in kept]

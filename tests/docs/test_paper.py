@@ -102,11 +102,8 @@ def test_drawing_twice_gives_the_same_bytes(drawn: list[Path], table: SigmaTable
 
 
 @pytest.mark.soak
-def test_whole_page_make_paper_writes(tmp_path: Path) -> None:
-    """The whole page is what make paper writes.
-
-    Every block is solved again.
-    """
+def test_the_whole_page_is_what_make_paper_writes(tmp_path: Path) -> None:
+    """Every block is solved again."""
     main(tmp_path)
     made, committed = ((folder / "paper.md").read_text(encoding="utf-8") for folder in (tmp_path, DOCS))
     assert_same_but_for_rounding(made, committed)

@@ -109,8 +109,7 @@ def test_readme_is_short() -> None:
     assert len(text("README.md").encode()) <= README_LIMIT
 
 
-def test_every_page_task_index_leads() -> None:
-    """Every page has a task and the index leads to it."""
+def test_every_page_has_a_task_and_the_index_leads_to_it() -> None:
     index = text("docs/index.md")
     pages = sorted(file.name for file in (ROOT / "docs").glob("*.md") if file.name != "index.md")
     assert [name for name in pages if f"]({name})" not in index] == []
@@ -122,8 +121,7 @@ def test_every_make_target_is_listed() -> None:
     assert [target for target in targets if target != "help" and f"| `make {target}` |" not in listed] == []
 
 
-def test_every_setting_listed_meaning() -> None:
-    """Every setting is listed with its meaning."""
+def test_every_setting_is_listed_with_its_meaning() -> None:
     listed = text("docs/deploy.md")
     names = [f"`UNDERSKIN_{name.upper()}`" for name in Settings.model_fields]
     assert [name for name in names if f"| {name} |" not in listed] == []

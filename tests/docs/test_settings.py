@@ -19,8 +19,7 @@ def rows(section: str) -> dict[str, str]:
     return dict(re.findall(r"^\| `([^`]+)` \| (.+) \|$", SECTIONS[section], flags=re.MULTILINE))
 
 
-def test_every_setting_documented_default() -> None:
-    """Every setting is documented with its default."""
+def test_every_setting_is_documented_with_its_default() -> None:
     documented = {name: section for name, section in SECTIONS.items() if name.startswith("`")}
     for name, field in Settings.model_fields.items():
         section = documented.pop(f"`UNDERSKIN_{name.upper()}`")
@@ -30,11 +29,8 @@ def test_every_setting_documented_default() -> None:
     assert not documented
 
 
-def test_every_variable_read_documented() -> None:
-    """Every variable that is read is documented.
-
-    Read: quoted in Python, or expanded in shell.
-    """
+def test_every_variable_that_is_read_is_documented() -> None:
+    """Read: quoted in Python, or expanded in shell."""
     folders = ("underskin", "service", "tablegen", "examples", "bench", "docs", "scripts", "tests")
     sources = [source for folder in folders for source in (ROOT / folder).rglob("*.*")]
     used: set[str] = set()

@@ -10,8 +10,7 @@ from tests.support.repository import ROOT
 
 
 @pytest.mark.slow
-def test_soak_run_again_skips_passed() -> None:
-    """A soak that is run again skips what has passed."""
+def test_a_soak_that_is_run_again_skips_what_has_passed() -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs", "tests/physics/test_response.py"]
     for _ in range(2):
         environment = os.environ | {"UNDERSKIN_SOAK": "1"}

@@ -25,11 +25,8 @@ def test_the_tour_is_up_to_date() -> None:
 @pytest.mark.server
 @pytest.mark.browser
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="chromium is not installed")
-def test_tour_shows_code_gives(tmp_path: Path) -> None:
-    """What the tour shows is what the code gives.
-
-    Every verdict and number that a page of the tour said when it was photographed.
-    """
+def test_what_the_tour_shows_is_what_the_code_gives(tmp_path: Path) -> None:
+    """Every verdict and number that a page of the tour said when it was photographed."""
     shown = json.loads((DOCS / "tour" / SHOWN).read_text(encoding="utf-8"))
     assert list(shown) == [step.name for step in STEPS]
     with serving(tmp_path) as address, browsing(address) as page:

@@ -33,8 +33,7 @@ def test_sensors_that_are_alike_are_grey() -> None:
     assert "no sensor's differs" in significance_note(np.full(64, 13.1), np.full(64, 0.12))
 
 
-def test_differs_coloured_scale_reaches_far() -> None:
-    """Who differs is coloured on a scale that reaches as far as chance."""
+def test_who_differs_is_coloured_on_a_scale_that_reaches_as_far_as_chance() -> None:
     values = 13.1 + 0.12 * np.random.default_rng(2).normal(size=64)
     values[17] = 14.2
     figure = drawn(values)
@@ -77,8 +76,7 @@ def test_stands_out_chosen_rings_every_value() -> None:
     )  # the legend shows the ring, whatever the disc's colour
 
 
-def test_signed_charge_zero_middle_colours() -> None:
-    """A signed charge has zero in the middle of its colours."""
+def test_a_signed_charge_has_zero_in_the_middle_of_its_colours() -> None:
     figure = loaded_array(SENSORS[:3], X[:3], Y[:3], [5.0, -2.0, 0.001], [0.01] * 3, [])
     (charge,) = [trace for trace in figure.data if trace.name == "charge"]
     assert (charge.marker.cmin, charge.marker.cmax) == (-5.0, 5.0)
@@ -89,8 +87,7 @@ def test_signed_charge_zero_middle_colours() -> None:
     assert green
 
 
-def test_charges_sign_coloured_0_grey() -> None:
-    """Charges of one sign are coloured from 0 and are grey within their error alone."""
+def test_charges_of_one_sign_are_coloured_from_0_and_are_grey_within_their_error_alone() -> None:
     figure = loaded_array(SENSORS[:4], X[:4], Y[:4], [5.0, 0.0006, 0.0002, -0.001], [0.006, *[0.0003] * 3], [])
     (charge,) = [trace for trace in figure.data if trace.name == "charge"]
     (grey,) = [trace for trace in figure.data if trace.name == "0 within its ±"]
@@ -102,8 +99,7 @@ def test_charges_sign_coloured_0_grey() -> None:
     assert (drawn_in.cmin, drawn_in.cmax) == (-5.0, 0.0)
 
 
-def test_sensor_not_measured_hollow_compared() -> None:
-    """A sensor that was not measured with the others is hollow and compared with none."""
+def test_a_sensor_that_was_not_measured_with_the_others_is_hollow_and_compared_with_none() -> None:
     values = np.array([14.0, 14.05, 13.95, 2.0])
     told = ["", "", "", "last measured on 03 May 2026"]
     figure = array_map(SENSORS[:4], X[:4], Y[:4], values, np.full(4, 0.1), [""] * 4, absent=told)

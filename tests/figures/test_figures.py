@@ -20,8 +20,7 @@ D33 = np.array([14.0, 15.0, 3.0])
 REASONS = ("", "", "weak: 21 % of the array's median")
 
 
-def test_frf_against_preload_points_line() -> None:
-    """Frf against preload has points and a line for each indenter."""
+def test_frf_against_preload_has_points_and_a_line_for_each_indenter() -> None:
     radius, preload = np.array([4.0, 4.0, 10.0, 10.0, 4.0]), np.array([1.0, 0.5, 0.5, 1.0, 1.0])
     frf = np.array([6.0, 6.2, 7.0, 6.9, 6.1])
     figure = frf_versus_preload(("a", "b", "c", "d", "e"), radius, preload, frf, 0.1 * frf, frf + 0.05)
@@ -36,8 +35,7 @@ def test_frf_against_preload_points_line() -> None:
     np.testing.assert_allclose(points["R 4 mm, measured"].error_y.array, SDS_OF_95 * 0.1 * points["R 4 mm, measured"].y)
 
 
-def test_response_sensor_interval_arrays() -> None:
-    """The response of each sensor has its interval and the arrays."""
+def test_the_response_of_each_sensor_has_its_interval_and_the_arrays() -> None:
     figure = response_per_sensor(SENSORS, D33, D33 - 1, D33 + 2, (13.5, 14.5), REASONS)
     assert [name for trace in figure.data for name in trace.x] == list(SENSORS)
     np.testing.assert_allclose(figure.data[0].error_y.array, 2)
@@ -50,14 +48,12 @@ def test_response_sensor_interval_arrays() -> None:
     assert figure.to_json()
 
 
-def test_column_length_refused_name() -> None:
-    """A column of another length is refused by name."""
+def test_a_column_of_another_length_is_refused_by_name() -> None:
     with pytest.raises(InvalidInput, match="high_pc_per_n"):
         response_per_sensor(SENSORS, D33, D33, D33[:2], (1.0, 2.0), REASONS)
 
 
-def test_raw_trace_many_samples_keeps_extremes() -> None:
-    """A raw trace of many samples keeps its extremes."""
+def test_a_raw_trace_of_many_samples_keeps_its_extremes() -> None:
     values = np.sin(np.arange(100_000) / 50)
     values[[4_321, 77_777]] = 9.0, -8.0
     figure = raw_traces([Channel("Load cell", "V", values), Channel("<b>", "", np.arange(5.0))], 1000.0)
@@ -72,8 +68,7 @@ def test_raw_trace_many_samples_keeps_extremes() -> None:
     assert " V<extra>" in long.hovertemplate
 
 
-def test_many_sensors_over_time_median_spread() -> None:
-    """Many sensors over time are their median their spread and those that stand apart."""
+def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_stand_apart() -> None:
     random, times = np.random.default_rng(3), ("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z")
     d33 = 14.0 + 0.4 * random.normal(size=(60, 2))
     d33[17, 1], d33[[21, 20, 22, 23], 0] = 9.0, [20.0, 20.1, 20.2, 20.3]
@@ -106,8 +101,7 @@ def test_many_sensors_over_time_median_spread() -> None:
     assert few.layout.showlegend is True
 
 
-def test_measured_lines_solid_differ_however() -> None:
-    """Measured lines are solid and differ however many they are."""
+def test_measured_lines_are_solid_and_differ_however_many_they_are() -> None:
     count, lines = 12, np.array([1.0, 10.0])
     history = d33_history([SensorPoints(f"s{n}", ["2024-05-01T09:00:00Z"], [14.0], [0.1], "") for n in range(count)])
     recordings = frf_recordings([FrfLines(f"r{n}", lines, lines, 0 * lines, lines) for n in range(count)], None)

@@ -37,8 +37,7 @@ def response(name: str, strength: int) -> Floats:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_law_changes_something_stronger(name: str) -> None:
-    """Each law changes something and the more the stronger it is."""
+def test_each_law_changes_something_and_the_more_the_stronger_it_is(name: str) -> None:
     drawn = effect(name)
     sizes = []
     for curves in zip(*(panel.curves for panel in drawn.panels), strict=True):
@@ -50,23 +49,20 @@ def test_law_changes_something_stronger(name: str) -> None:
     assert len(drawn.changes) == len(sizes)
 
 
-def test_delay_turns_phase_back_leaves_magnitude() -> None:
-    """A delay turns the phase back and leaves the magnitude."""
+def test_a_delay_turns_the_phase_back_and_leaves_the_magnitude() -> None:
     for strength, words in enumerate(effect("timing_delay").strengths):
         delay = number(words) * 1e-6
         exact = np.exp(-2j * np.pi * effect("timing_delay").x * delay)  # e^(+iωt): what comes late lags
         np.testing.assert_allclose(response("timing_delay", strength), exact, atol=1e-9)
 
 
-def test_high_pass_half_power_corner_leads() -> None:
-    """A high pass is half in power at its corner and leads."""
+def test_a_high_pass_is_half_in_power_at_its_corner_and_leads() -> None:
     for strength, words in enumerate(effect("amplifier_high_pass").strengths):
         ratio = 1j * effect("amplifier_high_pass").x / number(words)
         np.testing.assert_allclose(response("amplifier_high_pass", strength), ratio / (1 + ratio), atol=1e-9)
 
 
-def test_resonance_falls_root_mass() -> None:
-    """The resonance falls with the root of the mass."""
+def test_the_resonance_falls_with_the_root_of_the_mass() -> None:
     drawn = effect("contact_resonance")
     masses = [number(words) for words in drawn.strengths]
     assert masses == pytest.approx([1, 2, 4])
@@ -78,8 +74,7 @@ def test_resonance_falls_root_mass() -> None:
     assert resonances[1] / resonances[2] == pytest.approx(np.sqrt(2), rel=0.01)
 
 
-def test_scatter_deviation_drawn() -> None:
-    """What the scatter is one deviation of is drawn there."""
+def test_what_the_scatter_is_one_deviation_of_is_drawn_there() -> None:
     for strength, words in enumerate(effect("sensor_spread").strengths):
         np.testing.assert_allclose(response("sensor_spread", strength), np.exp(number(words)), rtol=1e-9)
     pickup = effect("mains_pickup")
@@ -93,15 +88,13 @@ def twins() -> dict[str, dict[str, Twin]]:
     return {name: {twin.name: twin for twin in rivals} for name, rivals in law_twins(table()).items()}
 
 
-def test_moving_edge_wrong_modulus_twins_curves() -> None:
-    """A moving edge and a wrong modulus are twins that curves tell apart."""
+def test_a_moving_edge_and_a_wrong_modulus_are_twins_that_curves_tell_apart() -> None:
     wrong = twins()["moving_contact_edge"]["modulus_error"]  # E acts through the contact's radius, as the edge does
     assert wrong.alike > 0.95
     assert set(wrong.kinds) == {"indentation", "compression"}
 
 
-def test_laws_axes_no_twins_alike_ways() -> None:
-    """Laws on other axes are no twins and all are alike both ways."""
+def test_laws_on_other_axes_are_no_twins_and_all_are_alike_both_ways() -> None:
     assert twins()["contact_resonance"]["ageing"].alike < 0.2
     assert twins()["timing_delay"]["thickness_error"].alike < 0.2
     for name, rivals in twins().items():

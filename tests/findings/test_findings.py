@@ -54,8 +54,7 @@ def test_no_percent_is_less_than_nothing() -> None:
     assert "(0 % of the array's median)" in statement(Reason.DEAD, {"percent": -1e-3})
 
 
-def test_code_reason_reason_words() -> None:
-    """Each code has a reason and each reason words."""
+def test_each_code_has_a_reason_and_each_reason_words() -> None:
     assert {reason.code for reason in Reason} == set(FindingCode) - {FindingCode.SEATING}  # of stored reports
     assert set(ENGLISH) == set(Reason)
     assert set(LACKING) == set(Lack)
@@ -68,11 +67,8 @@ def test_each_reason_is_used() -> None:
     assert [reason.name for reason in Reason if f"Reason.{reason.name}" not in text] == []
 
 
-def test_arguments_findings_words_need() -> None:
-    """Arguments of findings are those that their words need.
-
-    Where a finding is made with its arguments written out.
-    """
+def test_arguments_of_findings_are_those_that_their_words_need() -> None:
+    """Where a finding is made with its arguments written out."""
     checked = 0
     for path, call in findings_made():
         reason, arguments = call.args[0], call.args[3] if len(call.args) > 3 else None
@@ -135,8 +131,7 @@ def test_a_lack_says_what_was_refused_before() -> None:
     )
 
 
-def test_errors_carry_codes_survive_new_name() -> None:
-    """Errors carry codes that survive a new name."""
+def test_errors_carry_codes_that_survive_a_new_name() -> None:
     with pytest.raises(InvalidInput) as unlikely:
         checked("thickness_mm", 2500.0)
     assert unlikely.value.code == ErrorCode.UNLIKELY_MAGNITUDE
@@ -149,8 +144,7 @@ def test_errors_carry_codes_survive_new_name() -> None:
     assert FileError("a.tdms", "", "is empty").code == ErrorCode.UNREADABLE_FILE
 
 
-def test_errors_kind_sentence_code() -> None:
-    """Errors of one kind have one sentence and one code."""
+def test_errors_of_one_kind_have_one_sentence_and_one_code() -> None:
     for error, code, text in (
         (required("preload_n"), ErrorCode.REQUIRED, "preload_n: required"),
         (wrong_type("x_mm", "a", index=2), ErrorCode.WRONG_TYPE, "x_mm[2] = 'a': must be a number"),
@@ -198,8 +192,7 @@ def test_what_is_wrong_with_a_load_has_a_code() -> None:
         ({"sensor": "s9"}, ErrorCode.NOT_ONE_OF),
     ],
 )
-def test_wrong_recording_code(change: dict[str, Any], code: ErrorCode) -> None:
-    """What is wrong with a recording has a code."""
+def test_what_is_wrong_with_a_recording_has_a_code(change: dict[str, Any], code: ErrorCode) -> None:
     recording = {
         "id": "r",
         "sensor": "s0",

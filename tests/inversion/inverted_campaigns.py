@@ -42,7 +42,7 @@ def moved(campaign: Campaign, row: int, **changes: Any) -> Campaign:
     return replace(campaign, recordings=(*campaign.recordings[:row], recording, *campaign.recordings[row + 1 :]))
 
 
-def scaled(campaign: Campaign, row: int, factor: float) -> Campaign:
+def scaled(campaign: Campaign, row: int, factor: float | Floats) -> Campaign:
     recording = campaign.recordings[row]
     assert isinstance(recording, FrfRecording)
     assert recording.frf_re_pc_per_n is not None

@@ -42,11 +42,8 @@ def test_a_steady_fall_is_told_with_its_interval() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("gain", [0.0, 0.01])
-def test_intervals_cover_change_gain_date(gain: float) -> None:
-    """Intervals cover the change with the gain that a date has.
-
-    The scatter common to a date is no change of d33: five dates tell it, and the interval holds it.
-    """
+def test_intervals_cover_the_change_with_the_gain_that_a_date_has(gain: float) -> None:
+    """The scatter common to a date is no change of d33: five dates tell it, and the interval holds it."""
     generator, covered, apart = np.random.default_rng(2), 0, 0
     course, unchanged, number = np.log(np.linspace(1.0, 0.92, 5)), np.zeros(5), 150
     times = np.arange(5.0)
@@ -63,8 +60,7 @@ def test_intervals_cover_change_gain_date(gain: float) -> None:
     assert apart < 0.1 * number
 
 
-def test_sensor_departs_not_move_array() -> None:
-    """A sensor that departs does not move the array."""
+def test_a_sensor_that_departs_does_not_move_the_array() -> None:
     d33 = recorded(np.random.default_rng(3), STEADY)
     d33[2, 2:] *= 0.85
     found = told(d33)
@@ -76,8 +72,7 @@ def test_sensor_departs_not_move_array() -> None:
     assert "s03 changed by -1" in found.statement
 
 
-def test_sensor_dies_left_out_told_date() -> None:
-    """A sensor that dies is left out and told with its date."""
+def test_a_sensor_that_dies_is_left_out_and_told_with_its_date() -> None:
     d33 = recorded(np.random.default_rng(4), STEADY)
     d33[5, 2:] *= 1e-3
     found = told(d33)
@@ -86,18 +81,14 @@ def test_sensor_dies_left_out_told_date() -> None:
     assert "s06 is dead since 2026-05-06" in found.statement
 
 
-def test_two_dates_tell_change_chain_made() -> None:
-    """Two dates tell a change that the chain may have made."""
+def test_two_dates_tell_a_change_that_the_chain_may_have_made() -> None:
     found = told(recorded(np.random.default_rng(5), np.log([1.0, 0.9])))
     assert 100 * found.low < -10 < 100 * found.high
     assert "another gain of the chain" in found.statement
 
 
-def test_dates_share_no_sensor_not_compared() -> None:
-    """Dates that share no sensor are not compared.
-
-    Sensors one to four on the first two dates, the others on two later ones, with another gain.
-    """
+def test_dates_that_share_no_sensor_are_not_compared() -> None:
+    """Sensors one to four on the first two dates, the others on two later ones, with another gain."""
     d33 = recorded(np.random.default_rng(6), np.log([1.0, 1.0, 0.5, 0.5]))
     d33[:4, 2:] = d33[4:, :2] = np.nan
     found = told(d33)

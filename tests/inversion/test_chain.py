@@ -64,8 +64,7 @@ def test_turn_filter_not_stated_delay(table: SigmaTable) -> None:
     assert FindingCode.BEHIND_FILTER in codes(inversion)
 
 
-def test_inverted_sensor_told_whatever_delay(table: SigmaTable) -> None:
-    """An inverted sensor is told whatever the delay."""
+def test_an_inverted_sensor_is_told_whatever_the_delay(table: SigmaTable) -> None:
     turned = invert(shaken(charge=lambda f: -delayed(20e-3)(f)), table)
     assert array_d33(turned)[0] == pytest.approx(-D33, rel=0.02)
 
@@ -204,12 +203,9 @@ def test_nothing_tells_channel_noisy_interval(in_force: float, in_charge: float,
 
 
 @pytest.mark.parametrize(("in_force", "in_charge"), [(0.0, 0.003), (0.0, 0.0045), (0.0, 0.01), (0.02, 0.0)])
-def test_little_noise_over_lines_leaves_frf(in_force: float, in_charge: float) -> None:
-    """A little noise over all lines leaves an frf.
-
-    Force and charge are white: no noise has a larger share of either's power than γ² lost, and what γ² does not tell
-    apart is in the uncertainty.
-    """
+def test_a_little_noise_over_all_lines_leaves_an_frf(in_force: float, in_charge: float) -> None:
+    """Force and charge are white: no noise has a larger share of either's power than γ² lost, and what γ² does not tell
+    apart is in the uncertainty."""
     random, samples, gain = np.random.default_rng(1), 2**16, 7.4e-12
     force, noise = 0.05 * random.standard_normal(samples), random.standard_normal((2, samples))
     charge = gain * (force + 0.05 * np.sqrt(in_charge) * noise[1])
@@ -229,11 +225,8 @@ def test_little_noise_over_lines_leaves_frf(in_force: float, in_charge: float) -
         (low_pass(120.0, 2), "low-pass of about"),
     ],
 )
-def test_band_behind_filter_told_beside_d33(chain: Any, named: str, table: SigmaTable) -> None:
-    """A band behind a filter is told beside d33.
-
-    The flattest part of a flank is no flat zone.
-    """
+def test_a_band_behind_a_filter_is_told_beside_d33(chain: Any, named: str, table: SigmaTable) -> None:
+    """The flattest part of a flank is no flat zone."""
     inversion = invert(shaken(charge=chain), table)
     value, low, high = array_d33(inversion)
     told = [finding.sentence for finding in inversion.findings if finding.code == FindingCode.BEHIND_FILTER]

@@ -30,11 +30,8 @@ def table() -> SigmaTable:
 
 
 @pytest.mark.slow
-def test_intervals_cover_often_say_usual_scatter(table: SigmaTable) -> None:
-    """Intervals cover as often as they say and usual scatter is never set aside.
-
-    And of whole sensors seldom one is accused, at most in a campaign of twenty.
-    """
+def test_intervals_cover_as_often_as_they_say_and_usual_scatter_is_never_set_aside(table: SigmaTable) -> None:
+    """And of whole sensors seldom one is accused, at most in a campaign of twenty."""
     random = np.random.default_rng(1)
     arrays, sensors, cells, accused = [], [], [], 0
     for _ in range(CAMPAIGNS):
@@ -66,8 +63,7 @@ def test_the_scatters_come_back(table: SigmaTable, position_mm: float) -> None:
     np.testing.assert_allclose(found.sensors.value * 1e12, d33, rtol=0.05)
 
 
-def test_precise_rig_gives_back_d33_cell(table: SigmaTable) -> None:
-    """A precise rig gives back the d33 of each cell."""
+def test_a_precise_rig_gives_back_the_d33_of_each_cell(table: SigmaTable) -> None:
     d33 = np.array([14.0, 13.0, 15.0])
     rig = Rig(d33=d33, gain=1e-6, line=1e-6, largest_offset_mm=2.0)
     found = invert(simulate(table, rig, np.random.default_rng(4)), table)
@@ -75,8 +71,7 @@ def test_precise_rig_gives_back_d33_cell(table: SigmaTable) -> None:
     np.testing.assert_allclose(found.recordings.d33 * 1e12, d33[found.recordings.sensor], rtol=1e-4)
 
 
-def test_contact_outside_table_left_out_said(table: SigmaTable) -> None:
-    """A contact outside the table is left out and said so."""
+def test_a_contact_outside_the_table_is_left_out_and_said_so(table: SigmaTable) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0, 14.0])), np.random.default_rng(7))
     soft = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=0.9))
     found = invert(soft, table)
@@ -96,8 +91,7 @@ def refusal(campaign: Campaign, table: SigmaTable) -> str:
     return str(refused.value)
 
 
-def test_campaign_nothing_used_says_exceeds(table: SigmaTable) -> None:
-    """A campaign of which nothing can be used says what exceeds what."""
+def test_a_campaign_of_which_nothing_can_be_used_says_what_exceeds_what(table: SigmaTable) -> None:
     rig = Rig(d33=np.array([14.0]), indenters_mm=(4.0,), modulus_mpa=16.0, thickness_mm=2.5, preloads_n=(1.0, 2.0))
     campaign = simulate(table, rig, np.random.default_rng(7))
     hard = moved(moved(campaign, 0, preload_n=1000.0), 1, preload_n=50.0)
@@ -122,8 +116,7 @@ def test_campaign_nothing_used_says_exceeds(table: SigmaTable) -> None:
     assert "at most" not in refusal(heavy, table)
 
 
-def test_recording_without_line_band_told_apart(table: SigmaTable) -> None:
-    """A recording without a line in the band is told apart."""
+def test_a_recording_without_a_line_in_the_band_is_told_apart(table: SigmaTable) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(7))
     first = campaign.recordings[0]
     assert isinstance(first, FrfRecording)
@@ -132,8 +125,7 @@ def test_recording_without_line_band_told_apart(table: SigmaTable) -> None:
     assert [left.sentence for left in found.left_out] == ["recording r0: it has no line in the band"]
 
 
-def test_skin_much_thinner_scatter_positions(table: SigmaTable) -> None:
-    """A skin much thinner than the scatter of positions is inverted."""
+def test_a_skin_much_thinner_than_the_scatter_of_positions_is_inverted(table: SigmaTable) -> None:
     rig = Rig(
         d33=np.array([14.0, 14.0]), thickness_mm=0.1, sensor_radius_mm=0.06, modulus_mpa=100.0,
         preloads_n=(0.02, 0.05, 0.1), indenters_mm=(4.0,),
@@ -145,23 +137,20 @@ def test_skin_much_thinner_scatter_positions(table: SigmaTable) -> None:
 
 
 @pytest.mark.parametrize("factor", [0.0, 1e-300, 1e200])
-def test_campaign_without_charge_refused(table: SigmaTable, factor: float) -> None:
-    """A campaign without a charge that can be is refused."""
+def test_a_campaign_without_a_charge_that_can_be_is_refused(table: SigmaTable, factor: float) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(1.0,)), np.random.default_rng(16))
     with pytest.raises(InvalidInput, match=r"no charge in any|below 1 C/N|no number that can be meant"):
         invert(scaled(scaled(campaign, 0, factor), 1, factor), table)
 
 
-def test_users_band_used_campaign_without_frf(table: SigmaTable) -> None:
-    """The users band is used and a campaign without frf is refused."""
+def test_the_users_band_is_used_and_a_campaign_without_frf_is_refused(table: SigmaTable) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(8))
     assert invert(campaign, table, (10.0, 50.0)).zone.chosen_by_user
     with pytest.raises(InvalidInput, match="FRFs"):
         invert(replace(campaign, recordings=()), table)
 
 
-def test_declared_value_off_moves_d33_said(table: SigmaTable) -> None:
-    """A declared value that is off moves d33 by what is said."""
+def test_a_declared_value_that_is_off_moves_d33_by_what_is_said(table: SigmaTable) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0]), gain=1e-6, line=1e-6), np.random.default_rng(9))
     changes = []
     for name, off in (("thickness_mm", 1.02), ("sensor_radius_mm", 1.02), ("youngs_modulus_mpa", 1.1)):
@@ -172,8 +161,8 @@ def test_declared_value_off_moves_d33_said(table: SigmaTable) -> None:
     assert invert(campaign, table).declared_percent == pytest.approx(np.linalg.norm(changes), rel=0.1)
 
 
-def test_time_series_inverted_wrong_said(table: SigmaTable) -> None:
-    """Time series are inverted and what is wrong with them is said."""
+@pytest.mark.slow
+def test_time_series_are_inverted_and_what_is_wrong_with_them_is_said(table: SigmaTable) -> None:
     random = np.random.default_rng(10)
     campaign = simulate(table, Rig(d33=np.array([14.0, 14.0]), gain=1e-6, line=1e-6), random)
 
@@ -202,9 +191,9 @@ def test_time_series_inverted_wrong_said(table: SigmaTable) -> None:
     assert found.left_out[0].sentence.startswith("recording r1")
 
 
+@pytest.mark.slow
 @NEEDS_CAMPAIGNS
-def test_concealed_campaigns_nothing_missing(table: SigmaTable) -> None:
-    """Concealed campaigns with nothing missing."""
+def test_concealed_campaigns_with_nothing_missing(table: SigmaTable) -> None:
     folder = Path(os.environ["UNDERSKIN_CAMPAIGNS"])
     truth = json.loads((folder / "open-truth.json").read_text())
     plain = [name for name, known in truth.items() if not known["effects"]]

@@ -33,6 +33,15 @@ def codes(found: Inversion) -> dict[str, list[str]]:
     return {flag.sensor: [other.code for other in found.flags if other.sensor == flag.sensor] for flag in found.flags}
 
 
+@pytest.fixture(scope="module")
+def of_nine(table: SigmaTable) -> Campaign:
+    """Nine sensors of 14 pC/N, of which nothing is said."""
+    rig = Rig(d33=np.full(9, 14.0), preloads_n=tuple(np.linspace(0.5, 3, 8).tolist()))
+    campaign = simulate(table, rig, np.random.default_rng(5))
+    assert invert(campaign, table).flags == ()
+    return campaign
+
+
 def altered(campaign: Campaign, sensor: str, change: str) -> Campaign:
     random = np.random.default_rng(9)
 
@@ -59,13 +68,9 @@ def altered(campaign: Campaign, sensor: str, change: str) -> Campaign:
 
 
 @pytest.mark.parametrize("change", ["weak", "strong", "dead", "inverted", "noisy", "bent"])
-def test_marked_sensor_has_its_reason(table: SigmaTable, change: str) -> None:
+def test_marked_sensor_has_its_reason(table: SigmaTable, of_nine: Campaign, change: str) -> None:
     """A sensor unlike the others is marked with the reason."""
-    rig = Rig(d33=np.full(9, 14.0), preloads_n=tuple(np.linspace(0.5, 3, 8).tolist()))
-    campaign = simulate(table, rig, np.random.default_rng(5))
-    plain = invert(campaign, table)
-    found = invert(altered(campaign, "s4", change), table)
-    assert plain.flags == ()
+    found = invert(altered(of_nine, "s4", change), table)
     assert codes(found).keys() == {"s4"}
     assert any(flag.code == change and flag.reason.startswith(change) for flag in found.flags)
     assert found.campaign_d33 is not None
@@ -93,8 +98,7 @@ def test_whole_arrays_are_seldom_accused(table: SigmaTable) -> None:
         (-1.0, "is the sign of charge or force"),
     ],
 )
-def test_slip_whole_array_shows_finding(table: SigmaTable, factor: float, asks: str) -> None:
-    """A slip that the whole array shows is a finding."""
+def test_a_slip_that_the_whole_array_shows_is_a_finding(table: SigmaTable, factor: float, asks: str) -> None:
     campaign = simulate(table, Rig(d33=np.full(3, 14.0)), np.random.default_rng(7))
     assert invert(campaign, table).findings == ()
     slipped = campaign
@@ -106,8 +110,7 @@ def test_slip_whole_array_shows_finding(table: SigmaTable, factor: float, asks: 
 
 
 @pytest.mark.parametrize("x_mm", [19.0, 1e308])
-def test_recording_far_off_sensor_costs_itself(table: SigmaTable, x_mm: float) -> None:
-    """A recording far off its sensor costs only itself."""
+def test_a_recording_far_off_its_sensor_costs_only_itself(table: SigmaTable, x_mm: float) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(11))
     found = invert(moved(campaign, 0, position_mm=(x_mm, 0.0)), table)
     rest = invert(replace(campaign, recordings=campaign.recordings[1:]), table)
@@ -119,8 +122,7 @@ def test_recording_far_off_sensor_costs_itself(table: SigmaTable, x_mm: float) -
 
 
 @pytest.mark.parametrize(("sensors", "factor"), [(1, 10.0), (5, 1000.0), (1, -1.0), (5, 1e-3)])
-def test_recording_grossly_off_set_aside_named(table: SigmaTable, sensors: int, factor: float) -> None:
-    """A recording grossly off is set aside and named."""
+def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, sensors: int, factor: float) -> None:
     rig = Rig(d33=np.full(sensors, 14.0), preloads_n=(0.5, 2.0))
     campaign = simulate(table, rig, np.random.default_rng(13))
     found = invert(scaled(campaign, 0, factor), table)
@@ -217,8 +219,8 @@ def test_a_sensor_of_exact_zeros_is_dead(table: SigmaTable) -> None:
     assert np.isfinite([found.sensors.value, found.sensors.low, found.sensors.high]).all()
 
 
-def test_force_mean_contradicts_preload_finding(table: SigmaTable) -> None:
-    """A force whose mean contradicts the preload is a finding."""
+@pytest.mark.slow
+def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTable) -> None:
     random = np.random.default_rng(18)
     campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(1.0,)), random)
 
@@ -347,11 +349,8 @@ def test_force_at_the_mains_alone_is_said(table: SigmaTable, mains_hz: float) ->
             assert found.campaign_d33.d33_rows()[0][0] == pytest.approx(14.0, rel=0.02)
 
 
-def test_zeros_outside_analyzers_band(table: SigmaTable) -> None:
-    """Zeros outside an analyzers band are no response.
-
-    They are no lines: no filter is seen in them and no mains pick-up, and d33 is that of the others.
-    """
+def test_zeros_outside_an_analyzers_band_are_no_response(table: SigmaTable) -> None:
+    """They are no lines: no filter is seen in them and no mains pick-up, and d33 is that of the others."""
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(22))
     lines = np.arange(1, 401.0)
     noise = 1 + 0.01 * np.random.default_rng(23).standard_normal((len(campaign.recordings), 400))
@@ -371,8 +370,7 @@ def test_zeros_outside_analyzers_band(table: SigmaTable) -> None:
     assert found.findings == ()
 
 
-def test_exchanged_channels_force_charge_give(table: SigmaTable) -> None:
-    """Exchanged channels of force and charge give no d33."""
+def test_exchanged_channels_of_force_and_charge_give_no_d33(table: SigmaTable) -> None:
     random = np.random.default_rng(21)
     campaign = simulate(table, Rig(d33=np.array([14.0])), random)
     recording = campaign.recordings[0]
@@ -432,6 +430,7 @@ def test_a_filter_of_one_sensor_is_named_and_kept_from_the_array(corner_of_band:
     assert found.flags[0].arguments["high_pass_hz"] == pytest.approx(corner_of_band * frequency.max(), rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("per_kelvin", [0.0, 0.008])
 def test_a_temperature_that_rises_from_sensor_to_sensor(per_kelvin: float, table: SigmaTable) -> None:
     """Sensors that are alike are covered, however d33 follows the temperature that rises while they are measured in
@@ -465,6 +464,7 @@ def turned(campaign: Campaign, factor: Callable[[Floats], Complexes]) -> Campaig
     return replace(campaign, recordings=tuple(recordings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", first(2, [20.0, -60.0, 85.0]))
 def test_constant_phase_leaves_d33(table: SigmaTable, degrees: float) -> None:
     """A phase that is the same over frequency is stated, and d33 is that of the magnitude; a delay, a pole and a small
@@ -505,30 +505,68 @@ def test_two_ranges_of_an_amplifier(table: SigmaTable, higher: tuple[int, ...], 
     assert float(found.gain.value) < 0.06
 
 
+def of_changed_series(table: SigmaTable, of_force: float, of_charge: float) -> Inversion:
+    """Force about its mean and charge times factors from the middle of each recording on."""
+    plain, recordings = shaken(samples=8192), []
+    for recording in plain.of(FrfRecording):
+        force, charge = np.asarray(recording.force_n), np.asarray(recording.charge_pc)
+        later, mean = np.arange(len(force)) >= len(force) // 2, force.mean()
+        force = np.where(later, mean + of_force * (force - mean), force)
+        recordings.append(replace(recording, force_n=force, charge_pc=np.where(later, of_charge * charge, charge)))
+    return invert(replace(plain, recordings=tuple(recordings)), table)
+
+
 @pytest.mark.parametrize("factor", [1.1, 2.0, 0.0])
 def test_gain_changes_within_series(table: SigmaTable, factor: float) -> None:
     """A charge times a factor from the middle on is stated with it and the time, as no noise in the force, and the
-    interval holds either d33; neither a force that stops nor one whose size changes is such a change."""
-    plain = shaken(samples=8192)
-
-    def altered_series(of_force: float, of_charge: float) -> Inversion:
-        recordings = []
-        for recording in plain.of(FrfRecording):
-            force, charge = np.asarray(recording.force_n), np.asarray(recording.charge_pc)
-            later, mean = np.arange(len(force)) >= len(force) // 2, force.mean()
-            force = np.where(later, mean + of_force * (force - mean), force)
-            recordings.append(replace(recording, force_n=force, charge_pc=np.where(later, of_charge * charge, charge)))
-        return invert(replace(plain, recordings=tuple(recordings)), table)
-
-    found = altered_series(1.0, factor)
+    interval holds either d33."""
+    found = of_changed_series(table, 1.0, factor)
     (finding,) = [finding for finding in found.findings if finding.reason == Reason.GAIN_STEP]
     assert finding.arguments["ratio"] == pytest.approx(factor, abs=0.04)
     assert finding.arguments["step_s"] == pytest.approx(8192 / 800 / 2, abs=1.0)
     assert FindingCode.NOISE_IN_FRF not in [finding.code for finding in found.findings]
     assert found.campaign_d33 is not None
     assert float(found.campaign_d33.low) < D33 * 1e-12 < float(found.campaign_d33.high)
-    for steady in (altered_series(1.0, 1.0), altered_series(0.3, 0.3), altered_series(0.0, 0.0)):
-        assert FindingCode.GAIN_STEPS not in [finding.code for finding in steady.findings]
+
+
+@pytest.mark.parametrize("of_both", [1.0, 0.3, 0.0])
+def test_a_force_that_stops_or_changes_its_size_is_no_change_of_gain(table: SigmaTable, of_both: float) -> None:
+    found = of_changed_series(table, of_both, of_both)
+    assert FindingCode.GAIN_STEPS not in [finding.code for finding in found.findings]
+
+
+@pytest.mark.parametrize("alternates", [False, True])
+def test_lines_at_two_levels(table: SigmaTable, *, alternates: bool) -> None:
+    """A gain that steps between two frequencies, or alternates, leaves out a recording of several, and the array
+    without d33 where it is that of all; filters and resonances are no such steps."""
+    lines = np.geomspace(5, 120, 40)
+    rig = Rig(np.full(2, 14.0), frequency_hz=lines, preloads_n=(0.5, 1.0, 2.0), indenters_mm=(4.0,), line=0.005)
+    campaign = simulate(table, rig, np.random.default_rng(3))
+    step = np.where(np.arange(40) % 2 == 0 if alternates else lines > 25, 0.5, 1.0)
+    low_pass, peak = 1 / np.sqrt(1 + (lines / 40) ** 8), 1 / np.abs(1 - (lines / 60) ** 2 + 0.1j)
+
+    def found(by: Floats, count: int) -> tuple[Inversion, list[Finding]]:
+        changed = campaign
+        for row in range(count):
+            changed = scaled(changed, row, by)
+        inversion = invert(changed, table)
+        every = [*inversion.left_out, *inversion.findings]
+        return inversion, [
+            one for one in every if isinstance(one, Finding) and one.reason is Reason.GAIN_OVER_FREQUENCY
+        ]
+
+    single, (left_out,) = found(step, 1)
+    assert left_out.recording == campaign.recordings[0].id
+    assert single.campaign_d33 is not None
+    assert covered(single.campaign_d33, np.array(14.0))
+    every, (finding,) = found(step, len(campaign.recordings))
+    assert every.campaign_d33 is None
+    assert finding.arguments["factor"] == pytest.approx(2.0, rel=0.02)
+    assert finding.arguments["is_step"] != alternates
+    if not alternates:
+        assert finding.arguments["low_hz"] < 25 < finding.arguments["high_hz"] < 28
+    for smooth in (np.ones(40), low_pass, peak):
+        assert found(smooth, len(campaign.recordings))[1] == []
 
 
 @pytest.mark.parametrize("share", first(2, [0.0, 0.03, 0.003, 0.1]))

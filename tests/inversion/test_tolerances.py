@@ -59,8 +59,7 @@ def test_the_interval_goes_with_the_tolerances(table: SigmaTable) -> None:
     assert widths[2] > 1.5 * widths[1]
 
 
-def test_tolerances_part_every_form_campaign() -> None:
-    """Tolerances are part of every form of a campaign."""
+def test_tolerances_are_part_of_every_form_of_a_campaign() -> None:
     stated = {"thickness_percent": 1.0, "sensor_radius_percent": 0.5, "youngs_modulus_percent": 20.0}
     given = document(FRF)
     given["skin"] = {**given["skin"], "tolerances": stated}

@@ -1,10 +1,7 @@
 """Single contacts for the tests of the FRF's mechanisms, what is felt of them, and independent values."""
 
-import csv
-import os
-from pathlib import Path
-
 from tests.support.mechanism_campaigns import SKIN, campaign, frf_recording, predicted
+from tests.support.oracle import sphere_rows
 from underskin.recordings.campaign import FrfRecording, SkinDescription
 
 H, E = 2.5e-3, 2e6  # of mechanism_campaigns.SKIN [m, Pa]
@@ -32,18 +29,6 @@ def linear_contact(a_over_h: float, poisson_ratio: float = 0.5, offset_over_h: f
     )
 
 
-def oracle_rows(quantity: str, **fixed: str) -> list[dict[str, str]]:
-    """Rows of the linear layer's independent values."""
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "linear_layer.csv").open(newline="") as file:
-        return [
-            row
-            for row in csv.DictReader(file)
-            if row["quantity"] == quantity and all(row[name] == value for name, value in fixed.items())
-        ]
-
-
-def sphere_on_layer() -> list[dict[str, float]]:
+def contacts_within_the_table() -> list[dict[str, float]]:
     """The independent contact values with a/h up to 2."""
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "sphere_on_layer.csv").open(newline="") as file:
-        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    return [row for row in rows if row["a_over_h"] <= 2]
+    return [row for row in sphere_rows() if row["a_over_h"] <= 2]

@@ -55,8 +55,7 @@ def depths_and_times(campaign: Campaign) -> tuple[Floats, Floats]:
     return depth, np.concatenate([time - time[0] for time in times if time is not None])
 
 
-def test_factors_act_force_additions_add(campaign: Campaign) -> None:
-    """Factors act on the force and additions add to it."""
+def test_factors_act_on_the_force_and_additions_add_to_it(campaign: Campaign) -> None:
     timed = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
     later = tuple(replace(entry, time_s=7.0 + np.arange(float(len(entry.force_n)))) for entry in timed)
     campaign = replace(campaign, recordings=later)
@@ -70,8 +69,7 @@ def test_factors_act_force_additions_add(campaign: Campaign) -> None:
     assert drift == pytest.approx(plain + BEND * np.sqrt(time), rel=1e-9)
 
 
-def test_times_needed_law_reads(campaign: Campaign) -> None:
-    """Times are needed where the law reads them."""
+def test_times_are_needed_where_the_law_reads_them(campaign: Campaign) -> None:
     own = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
     untimed = replace(campaign, recordings=tuple(replace(entry, time_s=None) for entry in own))
     creeping = mechanism("modulus", "time_s", "1 - bend * time_s")
@@ -79,11 +77,8 @@ def test_times_needed_law_reads(campaign: Campaign) -> None:
     assert creeping.kinds == ("indentation",)
 
 
-def test_bound_law_counts_time_recording_began(campaign: Campaign) -> None:
-    """A bound law counts time from where the recording began.
-
-    Also where its first half is held out.
-    """
+def test_a_bound_law_counts_time_from_where_the_recording_began(campaign: Campaign) -> None:
+    """Also where its first half is held out."""
     own = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
     timed = [replace(entry, time_s=7.0 + np.arange(float(len(entry.force_n)))) for entry in own]
     whole = replace(campaign, recordings=tuple(timed))
@@ -116,8 +111,7 @@ def test_bound_law_counts_time_recording_began(campaign: Campaign) -> None:
         ("mean: 0, sd", "mean: 3, sd", 8, "must lie within -1 to 1"),
     ],
 )
-def test_cannot_act_curves_refused_line(old: str, new: str, line: int, said: str) -> None:
-    """What cannot act on curves is refused with its line."""
+def test_what_cannot_act_on_curves_is_refused_with_its_line(old: str, new: str, line: int, said: str) -> None:
     error = refusal(BENT.replace(old, new))
     assert error.place == f"line {line}"
     assert said in error.reason

@@ -79,8 +79,7 @@ def campaign() -> Campaign:
         "0 - " * 90 + "softening ** " * 90 + "1",
     ],
 )
-def test_no_arithmetic_refused_line(law: str) -> None:
-    """What is no arithmetic is refused with its line."""
+def test_what_is_no_arithmetic_is_refused_with_its_line(law: str) -> None:
     error = refusal(WARM.replace("1 - softening * (temperature_c - 23)", json.dumps(law)))
     assert error.file == "lab.yaml"
     assert error.place == "line 6"
@@ -126,8 +125,7 @@ def test_no_arithmetic_refused_line(law: str) -> None:
         ("schema: mechanism/1", "schema: [", 3, "not YAML"),
     ],
 )
-def test_bad_document_refused_line_reason(old: str, new: str, line: int, said: str) -> None:
-    """A bad document is refused with line and reason."""
+def test_a_bad_document_is_refused_with_line_and_reason(old: str, new: str, line: int, said: str) -> None:
     error = refusal(WARM.replace(old, new))
     assert error.place == f"line {line}"
     assert said in error.reason
@@ -137,8 +135,7 @@ def test_references_are_refused() -> None:
     assert "references" in refusal(WARM + "description2: &a text\nother: *a\n").reason
 
 
-def test_expressions_derivatives_numpy() -> None:
-    """Expressions and their derivatives are those of numpy."""
+def test_expressions_and_their_derivatives_are_those_of_numpy() -> None:
     text = "exp(-x) + log(x) * sqrt(x) / x ** 2 - sin(x) * cos(x) + tanh(x) + max(x, 1) * min(x, 3) + step(x - 2) + pi"
     expression = read(text, "law", {"x"})
 
@@ -159,8 +156,7 @@ def test_expressions_derivatives_numpy() -> None:
     assert complex(np.asarray(value_of(read("exp(i * pi)", "law", set()), {}))) == pytest.approx(-1.0)
 
 
-def test_declared_modulus_skin_much_softer(campaign: Campaign, table: SigmaTable) -> None:
-    """A declared modulus is that of a skin so much softer."""
+def test_a_declared_modulus_is_that_of_a_skin_so_much_softer(campaign: Campaign, table: SigmaTable) -> None:
     mechanism = parse(WARM.encode(), "lab.yaml").bind(campaign, table)
     assert mechanism.unsupported(campaign, "frf") is None
     model = FrfModel([mechanism], campaign, table)
@@ -175,16 +171,14 @@ def test_declared_modulus_skin_much_softer(campaign: Campaign, table: SigmaTable
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3)
 
 
-def test_campaign_without_column_not_support(campaign: Campaign) -> None:
-    """A campaign without the column does not support it."""
+def test_a_campaign_without_the_column_does_not_support_it(campaign: Campaign) -> None:
     bare = replace(campaign, recordings=tuple(replace(entry, conditions=None) for entry in campaign.recordings))
     reason = parse(WARM.encode(), "lab.yaml").unsupported(bare, "frf")
     assert reason is not None
     assert "temperature_c" in reason
 
 
-def test_declared_response_follows_frequency(campaign: Campaign, table: SigmaTable) -> None:
-    """A declared response follows frequency and amplitude."""
+def test_a_declared_response_follows_frequency_and_amplitude(campaign: Campaign, table: SigmaTable) -> None:
     text = """\
 schema: mechanism/1
 name: lossy_contact
@@ -216,8 +210,7 @@ def report_of(law: str, parameters: dict[str, float], **unnamed: Any) -> dict[st
     }  # fmt: skip
 
 
-def test_law_report_kept_read() -> None:
-    """The law of a report is kept and read again."""
+def test_the_law_of_a_report_is_kept_and_read_again() -> None:
     name = "unnamed_modulus__recorded_at__saturating"
     kept = report_of(name, {"law_change": -0.2, "law_approach": 3.0}, range={"recorded_at_h": [8.0, 18.0]})
     text = saving.document(kept, "warm_up")
@@ -253,11 +246,8 @@ def test_the_commands_check_and_save(tmp_path: Path) -> None:
     assert parse(saved, "drawn_film.yaml").name == "drawn_film"
 
 
-def test_file_takes_long_parse_refused_process() -> None:
-    """A file that takes long to parse is refused in another process.
-
-    Brackets within brackets take the pure Python loader a time that grows with the square of their number.
-    """
+def test_a_file_that_takes_long_to_parse_is_refused_in_another_process() -> None:
+    """Brackets within brackets take the pure Python loader a time that grows with the square of their number."""
     began = time.process_time()
     assert "nested more than" in refusal("[" * 99_000).reason
     assert time.process_time() - began < 2
@@ -271,11 +261,8 @@ def test_json_is_read_with_all_its_characters() -> None:
     assert parse(text.encode(), "lab.json").plain == document["description"]
 
 
-def test_file_folder_cannot_used_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file of the folder that cannot be used is named.
-
-    The catalogue lists the others; no diagnosis is made without it.
-    """
+def test_a_file_of_the_folder_that_cannot_be_used_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The catalogue lists the others; no diagnosis is made without it."""
     (tmp_path / "a.yaml").write_text(WARM.replace("high: 0.1, prior: {mean: 0.01, sd: 0.01}", "high: 1.0e-300"))
     (tmp_path / "b.yaml").write_text(WARM)
     (tmp_path / "c.yaml").write_text(WARM)

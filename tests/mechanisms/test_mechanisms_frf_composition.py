@@ -19,8 +19,7 @@ INSIDE: dict[str, dict[str, float]] = {
 VALUES = {name: value for values in INSIDE.values() for name, value in values.items()}
 
 
-def test_moving_edge_shapes_contact_stress() -> None:
-    """The moving edge has all that shapes contact and stress inside its derivative."""
+def test_the_moving_edge_has_all_that_shapes_contact_and_stress_inside_its_derivative() -> None:
     preload, step = 1.0, 1e-3
     charge = [
         force * level(list(INSIDE), frf_recording(preload_n=force, position_mm=(0.5, 0.0)), SKIN, **VALUES)

@@ -13,13 +13,12 @@ from tests.mechanisms.mechanism_contacts import (
     RHO,
     E,
     H,
+    contacts_within_the_table,
     level,
     linear_contact,
-    oracle_rows,
-    sphere_on_layer,
 )
 from tests.support.mechanism_campaigns import SKIN, campaign, frf_recording, predicted, table
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows
 from tests.support.sphere_contact import SphereOnLayer
 from underskin.mechanisms import compose
 from underskin.physics import hertz
@@ -28,9 +27,8 @@ from underskin.physics.hankel_transform import hertz_transform, normal_stress, p
 from underskin.surrogate.hdf5_format import load_contact
 
 
-@NEEDS_ORACLE
 def test_a_moving_edge_feels_the_flat_punch() -> None:
-    rows = oracle_rows("sigma_edge", poisson_ratio="0.5", glue_stiffness_h_over_2g="inf", rt_over_h="0.6")
+    rows = layer_rows("sigma_edge", poisson_ratio="0.5", glue_stiffness_h_over_2g="inf", rt_over_h="0.6")
     assert rows
     for row in rows:
         a, offset = float(row["a_over_h"]), float(row["offset_over_h"])
@@ -46,18 +44,14 @@ def test_a_moving_edge_has_the_published_ratios() -> None:
         assert (moving / level([], recording)).real == pytest.approx(ratio, abs=6e-4)
 
 
-def test_contact_wider_table_continued_wide() -> None:
-    """A contact wider than the table is continued as wide contacts transmit.
-
-    The pressure under a contact that is wide beside the thickness falls as 1/a².
-    """
+def test_a_contact_wider_than_the_table_is_continued_as_wide_contacts_transmit() -> None:
+    """The pressure under a contact that is wide beside the thickness falls as 1/a²."""
     for a, allowed in ((3.0, 1e-4), (3.2, 2e-3), (3.6, 1e-2), (4.2, 3e-2)):
         exact = normal_stress(transmission, hertz_transform, a, RHO)
         assert level([], linear_contact(a)).real == pytest.approx(float(exact), rel=allowed)
 
 
-def test_contact_wider_table_derivative() -> None:
-    """A contact wider than the table has the derivative of its continuation."""
+def test_a_contact_wider_than_the_table_has_the_derivative_of_its_continuation() -> None:
     model = compose(["modulus_error"], campaign([linear_contact(3.5)]), table())
     fit = np.array([entry.start for entry in model.parameters])
     step = np.zeros_like(fit)
@@ -75,10 +69,8 @@ def test_half_a_moving_edge_is_half_way() -> None:
     assert half == pytest.approx((still + moving) / 2, rel=1e-12)
 
 
-@NEEDS_ORACLE
-def test_layered_contact_layer_s_radius_pressure() -> None:
-    """A layered contact has the layer s radius and pressure."""
-    for row in sphere_on_layer():
+def test_a_layered_contact_has_the_layers_radius_and_pressure() -> None:
+    for row in contacts_within_the_table():
         a = row["a_over_h"]
         on_half_space = linear_contact(a)
         pressed = replace(on_half_space, preload_n=on_half_space.preload_n * row["force_over_hertz"])
@@ -118,8 +110,7 @@ def test_adhesion_is_jkr_on_the_half_space() -> None:
     assert found.real == pytest.approx(float(expected + strain), rel=1e-5)
 
 
-def test_adhesion_layer_together_jkr_layer() -> None:
-    """Adhesion and layer together are jkr on the layer."""
+def test_adhesion_and_layer_together_are_jkr_on_the_layer() -> None:
     w, recording = 0.3, frf_recording(preload_n=0.2)
     contact = SphereOnLayer(4e-3, E, H, Layer(), work_of_adhesion=w).at_force(0.2)
     a = contact.contact_radius / H
@@ -139,11 +130,8 @@ def strain_in_contact(a_over_h: float, load_parameter: float) -> float:
     return float(RectBivariateSpline(*solved.contact_axes, mean)(*at)[0, 0])
 
 
-def test_sphere_takes_back_dead_pressure_adds() -> None:
-    """A sphere takes back most of what a dead pressure adds.
-
-    PHYSICS.md, section 6: at L 0.09, R/h 1 a sphere's finite strain adds 2.3 % to σ, a dead pressure's 7.9 %.
-    """
+def test_a_sphere_takes_back_most_of_what_a_dead_pressure_adds() -> None:
+    """PHYSICS.md, section 6: at L 0.09, R/h 1 a sphere's finite strain adds 2.3 % to σ, a dead pressure's 7.9 %."""
     skin = replace(SKIN, thickness_mm=4.0, sensor_radius_mm=RHO * 4.0)
     force = 0.09 * 4.0**2 * E * 1e-6
     strained = frf_recording(preload_n=force, indenter_radius_mm=4.0)
@@ -154,11 +142,8 @@ def test_sphere_takes_back_dead_pressure_adds() -> None:
 
 
 @pytest.mark.parametrize("fraction", [0.2, 0.7])
-def test_held_contact_creeps_solid_modulus(fraction: float) -> None:
-    """A held contact creeps as a solid whose modulus relaxes so.
-
-    a³ by the hereditary integral of a constant force, ∫ E(t − s) d(a³)(s) = const, in steps of time.
-    """
+def test_a_held_contact_creeps_as_a_solid_whose_modulus_relaxes_so(fraction: float) -> None:
+    """a³ by the hereditary integral of a constant force, ∫ E(t − s) d(a³)(s) = const, in steps of time."""
     time = 30.0
     steps = np.linspace(0.0, 90.0, 3001)
     relaxed = 1 - fraction * (1 - np.exp(-steps / time))
@@ -175,8 +160,7 @@ def test_held_contact_creeps_solid_modulus(fraction: float) -> None:
         assert crept[0] == pytest.approx(softer[0], rel=1e-5)
 
 
-def test_fast_oscillation_meets_unrelaxed() -> None:
-    """A fast oscillation meets the unrelaxed modulus on the contact that crept."""
+def test_a_fast_oscillation_meets_the_unrelaxed_modulus_on_the_contact_that_crept() -> None:
     recordings = [frf_recording(dwell_s=1e6), frf_recording(id="other", dwell_s=0.0)]
     names = ["contact_creep", "contact_resonance"]
     crept = predicted(names, campaign(recordings), relaxed_fraction=0.4, relaxation_time=30.0, tip_mass=20.0)
@@ -185,9 +169,7 @@ def test_fast_oscillation_meets_unrelaxed() -> None:
     assert crept[: len(grown)] == pytest.approx(grown, rel=1e-9)
 
 
-def test_stiffening_contact_solves_strain() -> None:
-    """A stiffening contact solves its own strain."""
-
+def test_a_stiffening_contact_solves_its_own_strain() -> None:
     def misfit(factor: float) -> float:
         a = float(hertz.contact_radius(2.0, 4e-3, E * factor))
         return 1 + 5.0 * 0.2 * a / 4e-3 - factor
@@ -199,11 +181,8 @@ def test_stiffening_contact_solves_strain() -> None:
 
 
 @pytest.mark.parametrize(("dynamic", "error"), [(0.05, 1e-6), (0.33, 2e-5), (0.39, 1e-4), (0.8, 1e-5), (1.5, 0.01)])
-def test_moving_edge_gives_first_harmonic_charge(dynamic: float, error: float) -> None:
-    """A moving edge gives the first harmonic of the charge.
-
-    Beyond the preload the sphere leaves the skin for a part of the cycle.
-    """
+def test_a_moving_edge_gives_the_first_harmonic_of_the_charge(dynamic: float, error: float) -> None:
+    """Beyond the preload the sphere leaves the skin for a part of the cycle."""
     preload, phase = 1.0, (np.arange(512) + 0.5) * 2 * np.pi / 512
     force = np.maximum(preload + dynamic * np.sin(phase), 1e-9)
     a, load = hertz.contact_radius(force, 4e-3, E), hertz.load_parameter(force, 4e-3, E)
@@ -214,11 +193,8 @@ def test_moving_edge_gives_first_harmonic_charge(dynamic: float, error: float) -
     assert moving.real == pytest.approx(first_harmonic, rel=error)
 
 
-def test_without_dynamic_force_moving_edge_gives() -> None:
-    """Without a dynamic force a moving edge gives the limit of a small one.
-
-    The derivative of the charge, and the flat punch's σ where finite strain adds nothing.
-    """
+def test_without_a_dynamic_force_a_moving_edge_gives_the_limit_of_a_small_one() -> None:
+    """The derivative of the charge, and the flat punch's σ where finite strain adds nothing."""
     recording = replace(frf_recording(), dynamic_force_n=0.0)
     step = 1e-4
     charges = [f * level([], frf_recording(preload_n=f)).real for f in (1.0 - step, 1.0 + step)]

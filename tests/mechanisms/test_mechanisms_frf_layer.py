@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.mechanisms.mechanism_contacts import LINEAR_MM, RHO, E, H, level, linear_contact, oracle_rows
+from tests.mechanisms.mechanism_contacts import LINEAR_MM, RHO, E, H, level, linear_contact
 from tests.support.mechanism_campaigns import SKIN, campaign, frf_recording, predicted, table
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows
 from tests.support.yielding_bodies import REDUCED, WAVE_NUMBERS, film_strain, layer, press, transmitted
 from underskin.physics import charge_response, hertz
 from underskin.physics.elastic_layer import Layer
@@ -15,8 +15,7 @@ from underskin.physics.hankel_transform import hertz_transform, normal_stress
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 
 
-def test_base_model_table_hertz_radius() -> None:
-    """The base model is the table at hertz radius."""
+def test_the_base_model_is_the_table_at_hertz_radius() -> None:
     for preload, radius in ((0.5, 4.0), (2.0, 10.0)):
         a = hertz.contact_radius(preload, radius * 1e-3, E)
         load = hertz.load_parameter(preload, radius * 1e-3, E)
@@ -25,8 +24,7 @@ def test_base_model_table_hertz_radius() -> None:
         assert found == pytest.approx(np.full(len(found), complex(expected)), rel=1e-5)
 
 
-def test_base_model_beside_sensor_profile() -> None:
-    """The base model beside the sensor is the profile averaged over its disc."""
+def test_the_base_model_beside_the_sensor_is_the_profile_averaged_over_its_disc() -> None:
     a, load = hertz.contact_radius(1.0, 4e-3, E), hertz.load_parameter(1.0, 4e-3, E)
     for offset_mm in (0.7, 2.0, 4.5):
         e = np.array([offset_mm * 1e-3 / H])
@@ -35,11 +33,9 @@ def test_base_model_beside_sensor_profile() -> None:
         assert found.real == pytest.approx(expected, abs=1e-5)
 
 
-@NEEDS_ORACLE
 @pytest.mark.parametrize("poisson_ratio", ["0.48", "0.45", "0.4", "0.3"])
-def test_compressible_layer_transmits_exact(poisson_ratio: str) -> None:
-    """A compressible layer transmits as the exact one."""
-    rows = oracle_rows("sigma_hertz", poisson_ratio=poisson_ratio, glue_stiffness_h_over_2g="inf", rt_over_h="0.6")
+def test_a_compressible_layer_transmits_as_the_exact_one(poisson_ratio: str) -> None:
+    rows = layer_rows("sigma_hertz", poisson_ratio=poisson_ratio, glue_stiffness_h_over_2g="inf", rt_over_h="0.6")
     assert rows
     for row in rows:
         a, nu = float(row["a_over_h"]), float(poisson_ratio)
@@ -49,11 +45,9 @@ def test_compressible_layer_transmits_exact(poisson_ratio: str) -> None:
             assert found.real == pytest.approx(float(row["value"]), abs=2e-5)
 
 
-@NEEDS_ORACLE
 @pytest.mark.parametrize("glue", ["10.0", "1.0"])
-def test_yielding_glue_line_transmits_exact(glue: str) -> None:
-    """A yielding glue line transmits as the exact one."""
-    rows = oracle_rows("sigma_hertz", poisson_ratio="0.5", glue_stiffness_h_over_2g=glue, rt_over_h="0.6")
+def test_a_yielding_glue_line_transmits_as_the_exact_one(glue: str) -> None:
+    rows = layer_rows("sigma_hertz", poisson_ratio="0.5", glue_stiffness_h_over_2g=glue, rt_over_h="0.6")
     assert rows
     for row in rows:
         a = float(row["a_over_h"])
@@ -63,8 +57,7 @@ def test_yielding_glue_line_transmits_exact(glue: str) -> None:
             assert found.real == pytest.approx(float(row["value"]), abs=2e-5)
 
 
-def test_finite_strain_stays_layer_changes() -> None:
-    """Finite strain stays when the layer changes."""
+def test_finite_strain_stays_when_the_layer_changes() -> None:
     recording = frf_recording(preload_n=2.0)
     a, load = hertz.contact_radius(2.0, 4e-3, E), hertz.load_parameter(2.0, 4e-3, E)
     extra = table().sigma(a / H, RHO, load).sigma - table().sigma(a / H, RHO, 0.0).sigma
@@ -73,8 +66,7 @@ def test_finite_strain_stays_layer_changes() -> None:
     assert found.real == pytest.approx(float(glued + extra), rel=1e-5)
 
 
-def test_wrong_modulus_thickness_declared() -> None:
-    """A wrong modulus or thickness is the declared one changed."""
+def test_a_wrong_modulus_or_thickness_is_the_declared_one_changed() -> None:
     recording = frf_recording(position_mm=(1.0, 0.5))
     softer = level([], recording, replace(SKIN, youngs_modulus_mpa=1.4))
     assert level(["modulus_error"], recording, modulus_factor=0.7) == pytest.approx(softer, rel=1e-6)
@@ -89,14 +81,12 @@ def test_misalignment_is_a_moved_position() -> None:
     assert found == pytest.approx(moved, rel=1e-6)
 
 
-def test_every_press_centred_misalignment_length() -> None:
-    """Where every press is centred misalignment has a length only."""
+def test_where_every_press_is_centred_misalignment_has_a_length_only() -> None:
     moved = level([], frf_recording(position_mm=(0.0, 0.9)))
     assert level(["misalignment"], frf_recording(), offset=0.9) == pytest.approx(moved, rel=1e-6)
 
 
-def test_neighbours_tell_direction_centred_press() -> None:
-    """Neighbours tell in which direction a centred press is misaligned."""
+def test_neighbours_tell_in_which_direction_a_centred_press_is_misaligned() -> None:
     names = ["misalignment", "crosstalk"]
     for sensor, (x, y) in {"s1": (0.0, 0.0), "s2": (4.0, 0.0)}.items():
         moved = level(["crosstalk"], frf_recording(sensor=sensor, position_mm=(x - 0.4, y + 0.7)), fraction=0.2)
@@ -117,8 +107,7 @@ def test_film_stretched_on_its_glue(a_over_h: float, lag_over_h: float) -> None:
 
 
 @pytest.mark.parametrize(("depth", "ratio"), [(0.002, 1.0), (0.02, 0.5), (0.02, 4.0)])
-def test_tip_yields_on_a_layer(depth: float, ratio: float) -> None:
-    """A tip that yields presses the layer as rings of pressure on both bodies do."""
+def test_a_tip_that_yields_presses_the_layer_as_rings_of_pressure_on_both_bodies_do(depth: float, ratio: float) -> None:
     force, shape = press(50.0, depth, 1 / ratio)
     modulus = E / 0.75
     preload = 50.0 * force / REDUCED * modulus * H**3 / (LINEAR_MM * 1e-3)

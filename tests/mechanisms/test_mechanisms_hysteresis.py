@@ -24,8 +24,7 @@ def of_jkr(depth: Floats, work: float) -> Floats:
     return np.interp(depth, along[least:], force[least:])
 
 
-def test_edge_rests_until_costs_work_separation() -> None:
-    """The edge rests until it costs the work of separation then recedes."""
+def test_the_edge_rests_until_it_costs_the_work_of_separation_then_recedes() -> None:
     depth = np.concatenate([np.linspace(-0.05, 0.3, 71), np.linspace(0.3, -0.1, 401)[1:]])
     found = force_at(["adhesion"], depth, **HYSTERESIS)
     into = (depth[:71] >= 0).nonzero()[0]
@@ -42,8 +41,7 @@ def test_edge_rests_until_costs_work_separation() -> None:
     assert release == pytest.approx(0.5, rel=0.03)
 
 
-def test_hysteresis_loses_work_none() -> None:
-    """Hysteresis loses work and none without it."""
+def test_hysteresis_loses_work_and_none_without_it() -> None:
     depth = np.concatenate([np.linspace(0.0, 0.3, 301), np.linspace(0.3, 0.0, 301)[1:]])
 
     def lost(separation: float) -> float:
@@ -54,8 +52,7 @@ def test_hysteresis_loses_work_none() -> None:
     assert 1e-4 < lost(1.5) < lost(3.0)
 
 
-def test_creep_leaves_hysteresis_body_not_relax() -> None:
-    """Creep leaves the hysteresis of a body that does not relax."""
+def test_creep_leaves_the_hysteresis_of_a_body_that_does_not_relax() -> None:
     depth = np.concatenate([np.linspace(-0.05, 0.3, 71), np.linspace(0.3, -0.1, 81)[1:]])
     expected = force_at(["adhesion"], depth, **HYSTERESIS)
     found = force_at(["adhesion", "contact_creep"], depth, **HYSTERESIS, **NO_CREEP)
@@ -109,8 +106,7 @@ def test_drag_adds_its_coefficient_times_the_speed() -> None:
         compose(["liquid_drag"], recorded(depth[:60]), table())
 
 
-def test_radius_travel_travel_stiffening_law() -> None:
-    """The radius at a travel has that travel also where a stiffening law ends."""
+def test_the_radius_at_a_travel_has_that_travel_also_where_a_stiffening_law_ends() -> None:
     random = np.random.default_rng(8)
     count = 400
 
@@ -126,17 +122,7 @@ def test_radius_travel_travel_stiffening_law() -> None:
     assert np.abs(found - travel).max() < 1e-6 * np.ptp(travel)
 
 
-def test_without_adhesion_the_edge_is_hertz_s() -> None:
-    sphere = Sphere(np.full((1, 1, 1), 2e6), np.full((1, 1), 1e-3), compliance=np.full((1, 1, 1), 1e-5))
-    travel = np.linspace(1e-6, 1e-4, 20)[None, None]
-    a = sphere.radius_at(travel, np.zeros((1, 1, 1)))
-    force, depth, _, _ = sphere.at(a)
-    assert depth + 1e-5 * force == pytest.approx(travel, rel=1e-9)
-    assert force == pytest.approx(4 / 3 * 2e6 * a**3 / 1e-3, rel=1e-12)
-
-
-def test_sphere_not_stick_no_contact() -> None:
-    """A sphere that does not stick has no contact before the surface and hertzs beyond."""
+def test_a_sphere_that_does_not_stick_has_no_contact_before_the_surface_and_hertzs_beyond() -> None:
     sphere = Sphere(np.full((1, 1, 1), 2e6), np.full((1, 1), 1e-3), compliance=np.full((1, 1, 1), 1e-5))
     travel = np.array([[[-1e-4, -1e-9, 0.0, 1e-6, 2e-5, 3e-5, -1e-5, 1e-4]]])
     a = sphere.radius_at(travel, None)

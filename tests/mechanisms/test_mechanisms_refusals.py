@@ -38,16 +38,14 @@ REFUSALS: list[tuple[str, Campaign, str]] = [
 
 
 @pytest.mark.parametrize(("name", "recorded", "reason"), REFUSALS)
-def test_campaign_cannot_support_told_why(name: str, recorded: Campaign, reason: str) -> None:
-    """A campaign that cannot support it is told why."""
+def test_a_campaign_that_cannot_support_it_is_told_why(name: str, recorded: Campaign, reason: str) -> None:
     with pytest.raises(Unsupported, match=reason) as refusal:
         compose([name], recorded, table())
     assert refusal.value.mechanism == name
     assert name in str(refusal.value)
 
 
-def test_curves_without_times_cannot_support() -> None:
-    """Curves without times cannot support creep."""
+def test_curves_without_times_cannot_support_creep() -> None:
     for timed in (indentation_campaign(), compression_campaign()):
         curves = [entry for entry in timed.recordings if not isinstance(entry, FrfRecording)]
         untimed = replace(timed, recordings=tuple(replace(entry, time_s=None) for entry in curves))
@@ -78,8 +76,7 @@ def one_way(speed_mm_per_s: float, hold_s: float = 0.0) -> CompressionRecording:
     return CompressionRecording(f"{speed_mm_per_s}", 30.0, 30.0, displacement, 20 * displacement, time_s=time)
 
 
-def test_creep_needs_times_displacements() -> None:
-    """Creep needs times that displacements do not tell."""
+def test_creep_needs_times_that_displacements_do_not_tell() -> None:
     slow, fast, held = one_way(0.1), one_way(1.0), one_way(0.1, hold_s=60.0)
     for recordings in ((slow,), (slow, replace(slow, id="again"))):
         with pytest.raises(Unsupported, match="one way at one speed"):

@@ -22,8 +22,7 @@ def hilbert_phase(log_magnitude: Floats, log_frequency: Floats) -> Floats:
 
 
 @pytest.mark.slow
-def test_laws_over_frequency_minimum_phase_turn() -> None:
-    """Laws over frequency are of minimum phase or turn the phase alone."""
+def test_laws_over_frequency_are_of_minimum_phase_or_turn_the_phase_alone() -> None:
     wide = np.linspace(np.log(1e-5), np.log(1e8), 3001)
     inner = slice(1250, 1850)  # some 2 to 5000 Hz
     for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
@@ -45,8 +44,7 @@ def test_laws_over_frequency_minimum_phase_turn() -> None:
         assert np.unwrap(np.angle(factor))[inner] == pytest.approx(expected[inner], abs=0.02), law.name
 
 
-def test_delay_late_high_pass_amplifiers_order() -> None:
-    """A delay is late and a high pass is an amplifiers of any order."""
+def test_a_delay_is_late_and_a_high_pass_is_an_amplifiers_of_any_order() -> None:
     frequency = np.geomspace(1.0, 1000.0, 30)
     laws = {law.variant: law for law in frequency_laws(frequency)}
     late = laws["delay"].factor(frequency, {"law_lag": differentiated(0.1)}).value[0]
@@ -57,8 +55,7 @@ def test_delay_late_high_pass_amplifiers_order() -> None:
         assert laws["high_pass"].factor(frequency, values).value[0] == pytest.approx(amplifier**order)
 
 
-def test_kept_law_over_frequency_law() -> None:
-    """What is kept of a law over frequency is that law."""
+def test_what_is_kept_of_a_law_over_frequency_is_that_law() -> None:
     frequency = np.geomspace(2.0, 500.0, 9)
     for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
         values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_stated}
@@ -79,8 +76,7 @@ def differentiated(value: float) -> Differentiated:
     return Differentiated(np.array([[value]]), np.zeros((0, 1, 1)))
 
 
-def test_phase_bump_odd_slope() -> None:
-    """The phase of a bump is odd and that of its slope."""
+def test_the_phase_of_a_bump_is_odd_and_that_of_its_slope() -> None:
     u = np.linspace(-4.0, 4.0, 81)
     phase = phase_of_bump(u, 1.0)
     assert phase == pytest.approx(-phase[::-1], abs=1e-6)

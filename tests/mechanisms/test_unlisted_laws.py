@@ -71,8 +71,7 @@ def coordinates(law: UnlistedLaw, amplitude: float) -> list[float]:
     return [*(amplitude * sd for sd in sds), *law.grid[0][: len(law.parameters_stated) - count]]
 
 
-def test_grammar_holds_several_hundred_laws(grammar: Grammar) -> None:
-    """The grammar holds several hundred laws whose shares are a prior."""
+def test_the_grammar_holds_several_hundred_laws_whose_shares_are_a_prior(grammar: Grammar) -> None:
     assert len(grammar.laws) > 500
     assert len({law.name for law in grammar.laws}) == len(grammar.laws)
     assert 0.3 < np.exp(grammar.log_shares).sum() <= 1.0
@@ -140,8 +139,7 @@ def test_law_base_model_skin_changes(acts_on: str, size: float, campaign: Campai
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), (acts_on, number)
 
 
-def test_force_lost_smaller_preload(campaign: Campaign, table: SigmaTable, grammar: Grammar) -> None:
-    """A force that is lost is a smaller preload."""
+def test_a_force_that_is_lost_is_a_smaller_preload(campaign: Campaign, table: SigmaTable, grammar: Grammar) -> None:
     lost = next(law for law in grammar.laws if combination(law) == ("force", "preload_n", "threshold"))
     model = FrfModel([lost], campaign, table)
     found = predicted(model, [0.2])
@@ -151,8 +149,7 @@ def test_force_lost_smaller_preload(campaign: Campaign, table: SigmaTable, gramm
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), number
 
 
-def test_place_wanders_press_elsewhere(campaign: Campaign, table: SigmaTable) -> None:
-    """A place that wanders is a press elsewhere."""
+def test_a_place_that_wanders_is_a_press_elsewhere(campaign: Campaign, table: SigmaTable) -> None:
     axis = along(campaign, "order")
     _, model = one_law("position", axis, campaign, table)
     found = predicted(model, [0.8, -0.5])
@@ -166,8 +163,7 @@ def test_place_wanders_press_elsewhere(campaign: Campaign, table: SigmaTable) ->
 
 
 @pytest.mark.slow
-def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
-    """What is kept of a law over recordings is that law."""
+def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> None:
     for law in grammar.laws[:: 1 if SOAK else 4]:
         if not isinstance(law, RecordingLaw) or law.axis.words or law.description.form == "free":
             continue

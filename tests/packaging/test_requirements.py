@@ -51,22 +51,21 @@ def named(requirements: list[str]) -> set[str]:
 
 
 @pytest.mark.slow
-def test_library_requires_imports() -> None:
-    """The library requires what it imports and no more."""
+def test_the_library_requires_what_it_imports_and_no_more() -> None:
     assert imported("underskin") - named(EXTRAS["cluster"]) == named(PROJECT["dependencies"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("package", "extras"), [("service", ["server"]), ("tablegen", ["fem", "cluster"]), ("rig", []), ("proof", ["docs"])]
 )
-def test_package_checkout_imports_extra_requires(package: str, extras: list[str]) -> None:
-    """A package of the checkout imports what its extra requires."""
+def test_a_package_of_the_checkout_imports_what_its_extra_requires(package: str, extras: list[str]) -> None:
     needs = PROJECT["dependencies"] + [text for extra in extras for text in EXTRAS[extra]]
     assert imported(package) - required(needs) == set()
 
 
-def test_extra_server_requires_used() -> None:
-    """The extra of the server requires what is used and no more."""
+@pytest.mark.slow
+def test_the_extra_of_the_server_requires_what_is_used_and_no_more() -> None:
     assert named(EXTRAS["server"]) - imported("service") - BY_NAME == set()
 
 

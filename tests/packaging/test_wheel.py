@@ -73,8 +73,7 @@ def printed(environment: Environment, folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def test_wheel_holds_library_tables_alone(wheel: Path) -> None:
-    """The wheel holds the library and the tables alone."""
+def test_the_wheel_holds_the_library_and_the_tables_alone(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as file:
         names = file.namelist()
     assert {name.split("/")[0] for name in names} == {"underskin", f"underskin-{PROJECT['version']}.dist-info"}
@@ -101,8 +100,7 @@ def test_a_diagnosis(fresh: Environment, tmp_path: Path) -> None:
     assert (tmp_path / "reports" / "2017-06.html").stat().st_size > 100_000
 
 
-def test_help_says_commands_run(fresh: Environment, tmp_path: Path) -> None:
-    """The help says where the other commands run."""
+def test_the_help_says_where_the_other_commands_run(fresh: Environment, tmp_path: Path) -> None:
     image = (ROOT / "Dockerfile").read_text(encoding="utf-8")
     shown = printed(fresh, tmp_path, "--help").splitlines()
     for name, target in PROJECT["entry-points"]["underskin.commands"].items():
@@ -122,10 +120,9 @@ def test_help_says_commands_run(fresh: Environment, tmp_path: Path) -> None:
         ],
     ),
 )
-def test_command_wheel_not_hold_says_install(
+def test_a_command_that_the_wheel_does_not_hold_says_what_to_install(
     fresh: Environment, tmp_path: Path, command: str, where: str, extra: str
 ) -> None:
-    """A command that the wheel does not hold says what to install."""
     refusal = run(fresh, tmp_path, command)
     assert (refusal.returncode, refusal.stdout) == (2, "")
     install = f"; in a checkout, pip install -e '.[{extra}]' installs what it needs" if extra else ""
@@ -135,8 +132,7 @@ def test_command_wheel_not_hold_says_install(
 
 
 @pytest.mark.soak
-def test_checkout_without_extra_says_install(tmp_path: Path) -> None:
-    """A checkout without the extra says what to install."""
+def test_a_checkout_without_the_extra_says_what_to_install(tmp_path: Path) -> None:
     environment = new_environment(tmp_path / "venv", [*PROJECT["dependencies"], "hatchling", "editables"])
     environment.install("--editable", str(ROOT))
     refusal = run(environment, tmp_path, "serve")

@@ -1,15 +1,11 @@
 """A sphere on the layer: independent values, the half space's limits, Dimitriadis' series, and the equation itself."""
 
-import csv
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.polynomial import legendre
 from scipy.special import j0
 
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import sphere_rows
 from tests.support.sphere_contact import SphereContact, SphereOnLayer
 from underskin.errors import InvalidInput
 from underskin.physics import elastic_layer, hertz
@@ -32,10 +28,8 @@ def _sigma(contact: SphereContact, setup: SphereOnLayer, rho: float, offset: flo
     return float(transmitted) / contact.force
 
 
-@NEEDS_ORACLE
 def test_every_row_of_the_oracle() -> None:
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "sphere_on_layer.csv").open(newline="") as file:
-        rows = np.array([[float(x) for x in row] for row in list(csv.reader(file))[1:]])
+    rows = np.array([list(row.values()) for row in sphere_rows()])
     assert len(rows) == 60
     solved = ContactEquation(rows[:, 0]).solve(Layer())
     for found, expected in zip((solved.sphere_force, solved.sphere_depth, solved.stiffness), rows.T[1:], strict=True):
@@ -87,8 +81,7 @@ def test_a_thick_layer_gives_hertz() -> None:
         assert contact.stiffness == pytest.approx(1.5 * 0.5 / contact.indentation, rel=1e-8)
 
 
-def test_thick_layer_gives_johnson_kendall() -> None:
-    """A thick layer gives johnson kendall roberts."""
+def test_a_thick_layer_gives_johnson_kendall_roberts() -> None:
     work, body = 0.05, Layer(0.3)
     setup = SphereOnLayer(RADIUS, MODULUS, DEEP, body, work)
     modulus = setup.plane_modulus

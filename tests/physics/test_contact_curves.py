@@ -95,8 +95,7 @@ def test_derivatives_of_the_transforms() -> None:
             assert getattr(curves, name).slopes[index] == pytest.approx(difference, abs=1e-8)
 
 
-def test_whole_contact_sum_sphere_punch() -> None:
-    """A whole contact is the sum of sphere and punch."""
+def test_a_whole_contact_is_the_sum_of_sphere_and_punch() -> None:
     setup = SphereOnLayer(RADIUS, MODULUS, THICKNESS, Layer(0.45), 0.3)
     curves = GRID.curves(setup.layer)
     node = 12

@@ -10,8 +10,7 @@ from underskin.physics import half_space, hertz
 RADII = np.array([0.0, 0.1, 0.5, 1.0, 3.0, 10.0])
 
 
-def test_point_force_point_sensor_boussinesq() -> None:
-    """Point force on a point sensor is boussinesq."""
+def test_point_force_on_a_point_sensor_is_boussinesq() -> None:
     assert half_space.gamma_n(RADII, 0.0) == pytest.approx((1 + RADII**2) ** -2.5, abs=1e-13)
     assert half_space.gamma_t(RADII, 0.0) == pytest.approx(RADII * (1 + RADII**2) ** -2.5, abs=1e-13)
 
@@ -22,8 +21,7 @@ def test_point_force_over_a_centred_disc() -> None:
     assert half_space.gamma_n(0.0, rho) == pytest.approx(exact, rel=1e-12)
 
 
-def test_hertz_pressure_point_sensor_delta() -> None:
-    """Hertz pressure on a point sensor is delta."""
+def test_hertz_pressure_on_a_point_sensor_is_delta() -> None:
     assert half_space.sigma(RADII, 0.0) == pytest.approx(half_space.delta(RADII), rel=1e-11)
 
 
@@ -32,20 +30,14 @@ def test_limits_named_in_the_paper() -> None:
     assert half_space.delta(0.0) == 1.0
 
 
-def test_plane_depth_carries_whole_force() -> None:
-    """The plane at depth carries the whole force.
-
-    2π ∫ T3 r dr = −F: with ρ large, σ (3/2) ρ² → 1.
-    """
+def test_the_plane_at_depth_carries_the_whole_force() -> None:
+    """2π ∫ T3 r dr = −F: with ρ large, σ (3/2) ρ² → 1."""
     assert 1.5 * 10.0**2 * half_space.sigma(0.5, 10.0) == pytest.approx(1.0, abs=2e-3)
 
 
 @given(a=st.floats(0, 5), rho=st.floats(0, 5), offset=st.floats(0, 5))
-def test_reciprocity_pressure_sensor_discs(a: float, rho: float, offset: float) -> None:
-    """Reciprocity of pressure and sensor discs.
-
-    A uniform pressure disc of radius a over a sensor disc of radius ρ equals the two exchanged.
-    """
+def test_reciprocity_of_pressure_and_sensor_discs(a: float, rho: float, offset: float) -> None:
+    """A uniform pressure disc of radius a over a sensor disc of radius ρ equals the two exchanged."""
     from underskin.physics.hankel_transform import disc_average, normal_stress
 
     def transmission(k: np.ndarray) -> np.ndarray:

@@ -1,14 +1,10 @@
 """The layer of any Poisson ratio and glue line: independent values (good to about 5e-10), limits, derivatives."""
 
-import csv
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from tablegen import linear_layer
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows
 from underskin.errors import InvalidInput
 from underskin.physics import elastic_layer
 from underskin.physics.elastic_layer import Layer, slip
@@ -23,12 +19,10 @@ FUNCTIONS = ["transmission", "tangential_transmission", "compliance", "stiffenin
 def _oracle(quantity: str) -> dict[Layer, Floats]:
     """Columns rt_over_h, a_over_h, offset_over_h and value, (4, rows), of every layer; κ is twice the file's column."""
     rows: dict[Layer, list[list[float]]] = {}
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "linear_layer.csv").open(newline="") as file:
-        for row in csv.DictReader(file):
-            if row["quantity"] == quantity:
-                body = Layer(float(row["poisson_ratio"]), slip(2 * float(row["glue_stiffness_h_over_2g"])))
-                names = ("rt_over_h", "a_over_h", "offset_over_h", "value")
-                rows.setdefault(body, []).append([float(row[name] or "nan") for name in names])
+    for row in layer_rows(quantity):
+        body = Layer(float(row["poisson_ratio"]), slip(2 * float(row["glue_stiffness_h_over_2g"])))
+        names = ("rt_over_h", "a_over_h", "offset_over_h", "value")
+        rows.setdefault(body, []).append([float(row[name] or "nan") for name in names])
     return {body: np.array(values).T for body, values in rows.items()}
 
 
@@ -36,7 +30,6 @@ def _punch_sigma(body: Layer, a: Floats, rho: Floats) -> Floats:
     return normal_stress(lambda k: body.transmission(k).value, punch_transform, a, rho)
 
 
-@NEEDS_ORACLE
 @pytest.mark.parametrize(
     ("quantity", "layers"), [("sigma_hertz", 8), ("sigma_edge", 8), ("gamma_n", 8), ("gamma_t", 5)]
 )
@@ -55,19 +48,15 @@ def test_every_row_of_the_oracle(quantity: str, layers: int) -> None:
         assert found == pytest.approx(value, abs=2e-8), body
 
 
-def test_incompressible_bonded_layer_closed_form() -> None:
-    """The incompressible bonded layer has its closed form."""
+def test_the_incompressible_bonded_layer_has_its_closed_form() -> None:
     assert Layer().transmission(K).value == pytest.approx(linear_layer.transmission(K), rel=1e-13)
     k = K[2:-1]
     closed = (np.sinh(2 * k) - 2 * k) / (1 + 2 * k**2 + np.cosh(2 * k))
     assert Layer().compliance(k).value == pytest.approx(closed, rel=1e-12)
 
 
-def test_frictionless_base_transmits_alike() -> None:
-    """A frictionless base transmits alike for every poisson ratio.
-
-    (sinh k + k cosh k)/(sinh k cosh k + k), as for the half of a plate of thickness 2h pressed from both sides.
-    """
+def test_a_frictionless_base_transmits_alike_for_every_poisson_ratio() -> None:
+    """(sinh k + k cosh k)/(sinh k cosh k + k), as for the half of a plate of thickness 2h pressed from both sides."""
     k = K[2:-1]
     closed = (np.sinh(k) + k * np.cosh(k)) / (np.sinh(k) * np.cosh(k) + k)
     for poisson_ratio in (0.0, 0.3, 0.5):
@@ -85,8 +74,7 @@ def test_small_wave_numbers() -> None:
         assert body.transmission(k).value == pytest.approx(1.0, abs=1e-6)
 
 
-def test_nothing_overflows_thick_layer_half() -> None:
-    """Nothing overflows and a thick layer is a half space."""
+def test_nothing_overflows_and_a_thick_layer_is_a_half_space() -> None:
     k = np.array([0.0, 60.0, 800.0, 1e5])
     for body in LAYERS:
         for name in FUNCTIONS:

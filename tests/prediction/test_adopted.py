@@ -64,24 +64,21 @@ def lines(campaign: Campaign) -> Any:
     )
 
 
-def test_response_times_d33_mechanisms_record() -> None:
-    """A response times d33 is what the mechanisms record."""
+def test_a_response_times_d33_is_what_the_mechanisms_record() -> None:
     campaign = recorded(VALUES)
     found = adopted(report(VALUES), campaign).response(campaign, table())
     np.testing.assert_allclose(D33 * found.value, lines(campaign), rtol=1e-12)
     assert found.inside.all()
 
 
-def test_mechanisms_record_translated_base_model() -> None:
-    """What the mechanisms record is translated to what the base model would."""
+def test_what_the_mechanisms_record_is_translated_to_what_the_base_model_would() -> None:
     campaign = recorded(VALUES)
     translated, left_out = adopted(report(VALUES), campaign).as_base_model(campaign, table())
     assert left_out == []
     np.testing.assert_allclose(lines(translated), lines(recorded({})), rtol=1e-12)
 
 
-def test_level_leaves_out_acts_line_line() -> None:
-    """A level leaves out what acts line by line."""
+def test_a_level_leaves_out_what_acts_line_by_line() -> None:
     campaign = recorded(VALUES)
     without = {name: values for name, values in VALUES.items() if name != "timing_delay"}
     model = adopted(report(VALUES), campaign)
@@ -93,8 +90,7 @@ def test_level_leaves_out_acts_line_line() -> None:
     assert model.needs == {"dwell_s": "contact_creep", "sensor": "crosstalk", "load_cycles": "ageing"}
 
 
-def test_recording_lacks_mechanism_needs_named() -> None:
-    """A recording that lacks what a mechanism needs is named."""
+def test_a_recording_that_lacks_what_a_mechanism_needs_is_named() -> None:
     campaign = recorded(VALUES)
     first, *others = frf_recordings(campaign)
     lacking = replace(campaign, recordings=(replace(first, load_cycles=None), *others))
@@ -106,8 +102,7 @@ def centred(campaign: Campaign) -> Campaign:
     return replace(campaign, recordings=tuple(replace(one, position_mm=None) for one in frf_recordings(campaign)))
 
 
-def test_misalignment_found_beside_sensors() -> None:
-    """A misalignment found beside the sensors serves presses on their centres."""
+def test_a_misalignment_found_beside_the_sensors_serves_presses_on_their_centres() -> None:
     values: dict[str, tuple[float, ...]] = {"misalignment": (0.6, -0.8)}
     model = adopted(report(values), recorded(values))
     asked = centred(frf_campaign())
@@ -124,8 +119,7 @@ def _shifted(entry: FrfRecording, x_mm: float, y_mm: float) -> FrfRecording:
     return replace(entry, position_mm=(centre.x_mm + x_mm, centre.y_mm + y_mm))
 
 
-def test_misalignment_unknown_direction_serves() -> None:
-    """A misalignment of unknown direction serves no press beside a centre."""
+def test_a_misalignment_of_unknown_direction_serves_no_press_beside_a_centre() -> None:
     found = report({})
     found["mechanisms"] = [{"name": "misalignment", "parameters": [{"name": "offset", "value": 0.7}]}]
     model = adopted(found, centred(frf_campaign()))
@@ -134,8 +128,7 @@ def test_misalignment_unknown_direction_serves() -> None:
         model.response(frf_campaign(), table())
 
 
-def test_beside_crosstalk_misalignment_direction() -> None:
-    """Beside crosstalk a misalignment has a direction on centres too."""
+def test_beside_crosstalk_a_misalignment_has_a_direction_on_centres_too() -> None:
     found = report({})
     found["mechanisms"] = [
         {"name": "misalignment", "parameters": [{"name": f"offset_{axis}", "value": 0.7} for axis in "xy"]},
@@ -144,8 +137,7 @@ def test_beside_crosstalk_misalignment_direction() -> None:
     assert adopted(found, centred(frf_campaign())).response(centred(frf_campaign()), table()).inside.all()
 
 
-def test_skin_declared_otherwise_not_translated() -> None:
-    """A skin that is declared otherwise is not translated."""
+def test_a_skin_that_is_declared_otherwise_is_not_translated() -> None:
     campaign = recorded({})
     other = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=3.0))
     with pytest.raises(InvalidInput, match="youngs_modulus_mpa"):
@@ -167,8 +159,7 @@ def test_what_cannot_serve_is_refused(changes: dict[str, Any]) -> None:
         adopted(report({}, **changes), frf_campaign())
 
 
-def test_uncertainty_diagnosed_d33() -> None:
-    """Its uncertainty is that of the diagnosed d33."""
+def test_its_uncertainty_is_that_of_the_diagnosed_d33() -> None:
     model = adopted(report({}, d33={"low": D33 * np.exp(-0.0196), "high": D33 * np.exp(0.0196)}), frf_campaign())
     assert isinstance(model, AdoptedModel)
     assert model.unsure == pytest.approx(0.01, rel=1e-3)

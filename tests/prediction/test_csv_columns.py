@@ -43,8 +43,7 @@ def test_points_or_commas_are_the_decimal_mark(text: str) -> None:
         ("preload_n;frf_pc_per_n\n0,5;7.5\n", r"frf_pc_per_n\[0\] = '7.5': must be a number \(line 2\)"),
     ],
 )
-def test_number_thousands_apart_refused(text: str, says: str) -> None:
-    """A number that may have its thousands apart is refused."""
+def test_a_number_that_may_have_its_thousands_apart_is_refused(text: str, says: str) -> None:
     with pytest.raises(InvalidInput, match=says):
         numbers(text)
 
@@ -59,8 +58,7 @@ def test_number_thousands_apart_refused(text: str, says: str) -> None:
         ("frf_magnitude_pc_per_n,frf_phase", "60"),
     ],
 )
-def test_magnitude_phase_taken_real_part(headings: str, phase: str) -> None:
-    """Magnitude and phase are taken as the real part."""
+def test_magnitude_and_phase_are_taken_as_the_real_part(headings: str, phase: str) -> None:
     found = from_csv(f"preload_n,{headings}\n1,7,{phase}\n".encode(), FIELDS)
     assert found.fields["frf_pc_per_n"].numbers("frf_pc_per_n") == pytest.approx([3.5])
     assert found.unknown == {}
@@ -82,8 +80,7 @@ def test_magnitude_phase_taken_real_part(headings: str, phase: str) -> None:
         ("frf_magnitude_pc_per_n,frf_phase_deg,FRF phase [°]\n7,1,7\n", "its header has 'frf_phase_rad' twice"),
     ],
 )
-def test_magnitude_phase_not_clear_refused(text: str, says: str) -> None:
-    """Magnitude and phase that are not clear are refused."""
+def test_magnitude_and_phase_that_are_not_clear_are_refused(text: str, says: str) -> None:
     with pytest.raises(CsvError, match=says):
         from_csv(text.encode(), FIELDS)
 

@@ -41,8 +41,7 @@ def test_above_the_sensor_the_response_is_sigma() -> None:
         assert np.interp(own, sweep.values, sweep.sigma) == pytest.approx(float(found.contact.sigma), rel=5e-3)
 
 
-def test_point_load_beside_sensor_exact_layer_s() -> None:
-    """A point load beside the sensor is the exact layer s."""
+def test_a_point_load_beside_the_sensor_is_the_exact_layers() -> None:
     found = of()
     exact = {0.0: 0.988193, 0.5: 0.669810, 1.0: 0.193228, 2.0: 0.002007}  # γ_n of the bonded layer at ρ = 0.6
     offsets = found.offset / 2.5e-3
@@ -61,9 +60,7 @@ OFFSET = np.linspace(0, 12 * SPREAD, 600)
 BELL = np.exp(-((OFFSET / SPREAD) ** 2) / 2)
 
 
-def test_two_bells_under_fine_array_told_apart() -> None:
-    """Two bells under a fine array are told apart where their sum dips."""
-
+def test_two_bells_under_a_fine_array_are_told_apart_where_their_sum_dips() -> None:
     def dip(distance: float) -> float:
         def total(x: float) -> float:
             return float(
@@ -80,8 +77,7 @@ def test_two_bells_under_fine_array_told_apart() -> None:
     assert found.best_separation == pytest.approx(exact, rel=0.03)
 
 
-def test_array_too_coarse_see_every_load_tells() -> None:
-    """An array too coarse to see every load tells no two apart everywhere."""
+def test_an_array_too_coarse_to_see_every_load_tells_no_two_apart_everywhere() -> None:
     found = resolution(OFFSET, BELL, 8 * SPREAD, 0.0, 0.1)
     assert np.isnan(found.separation)
     # Two loads to each side of a sensor, as near to it as their own sensors, a pitch away, read the dip's share.

@@ -18,8 +18,7 @@ def limits(**fields: float | list[float]) -> list[str | None]:
     return [None] if answer.limits is None else list(answer.limits)
 
 
-def test_load_too_high_named_row_row() -> None:
-    """The load that is too high is named row by row."""
+def test_the_load_that_is_too_high_is_named_row_by_row() -> None:
     assert limits(preload_n=[1.0, 300.0, 25.6]) == [None, "L = 1.17 exceeds 0.1: at most 25.6 N", None]
     assert limits(preload_n=[1.0, 25.6]) == [None]
 
@@ -49,16 +48,14 @@ def test_what_no_force_helps_is_named_alone() -> None:
     assert limits(poisson_ratio=0.3) == ["Poisson's ratio = 0.3: the table is of incompressible elastomer, 0.5"]
 
 
-def test_result_beyond_floats_named() -> None:
-    """A result beyond the floats is named as that."""
+def test_a_result_beyond_the_floats_is_named_as_that() -> None:
     given = {**SKIN, "indenter_radius_mm": 4.0, "preload_n": 1.0, "frf_pc_per_n": 1.7e308}
     with np.errstate(over="ignore"):
         answer = answers.d33(TABLE, {name: np.asarray(value) for name, value in given.items()}, True)
     assert answer.limits == ["the result is too large a number"]
 
 
-def test_number_written_digits_tell_limit() -> None:
-    """A number is written with the digits that tell it from its limit."""
+def test_a_number_is_written_with_the_digits_that_tell_it_from_its_limit() -> None:
     points = {name: np.asarray(value) for name, value in (("rt_over_h", 0.6), ("load_parameter", 0.0))}
     told = {
         value: answers.sigma(TABLE, {**points, "a_over_h": np.asarray(value)}, "layer").limits

@@ -54,8 +54,7 @@ def curve(skin: SkinDescription = SKIN) -> Conditions:
     return Conditions("curve", skin, (IndentationConditions("i", 4.0, DEPTH_MM),))
 
 
-def test_campaign_conditions_alone_predicted() -> None:
-    """A campaign and its conditions alone are predicted alike."""
+def test_a_campaign_and_its_conditions_alone_are_predicted_alike() -> None:
     campaign = frf_campaign()
     alone = Conditions("alone", campaign.skin, tuple(entry.without_measurements() for entry in frf_entries(campaign)))
     assert not any(isinstance(entry, FrfRecording) for entry in alone.recordings)
@@ -78,8 +77,7 @@ def test_it_is_what_a_fit_composes() -> None:
     np.testing.assert_allclose(predict(campaign, table(), COMBINED, mechanisms=MECHANISMS).value, expected, rtol=1e-14)
 
 
-def test_derivatives_parameters_units() -> None:
-    """Derivatives are by the parameters in their units."""
+def test_derivatives_are_by_the_parameters_in_their_units() -> None:
     conditions = rows(dwell_s=[2.0, 60.0, 600.0], load_cycles=[0.0, 300.0, 900.0], dynamic_force_n=0.1)
     derivatives = predict(conditions, table(), COMBINED, mechanisms=MECHANISMS).derivatives
     for name, value in COMBINED.items():
@@ -108,18 +106,14 @@ def test_the_declared_d33_is_the_default() -> None:
     assert predict(own, table()).value == predict(given, table(), {"d33": 14.0}).value
 
 
-def test_skin_without_sensors_origin() -> None:
-    """A skin without sensors has one at the origin."""
+def test_a_skin_without_sensors_has_one_at_the_origin() -> None:
     bare = replace(SKIN, sensors=())
     conditions = frf_conditions(bare, indenter_radius_mm=4.0, preload_n=1.0, frequency_hz=30.0)
     assert [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors] == [(0.0, 0.0)]
 
 
-def test_indentation_follows_hertz_displacement() -> None:
-    """An indentation follows hertz from displacement zero.
-
-    Without finite strain; half of it, where nothing is said, makes the force up to 1.3 % less.
-    """
+def test_an_indentation_follows_hertz_from_displacement_zero() -> None:
+    """Without finite strain; half of it, where nothing is said, makes the force up to 1.3 % less."""
     hertz = hertz_force(DEPTH_MM, 4.0, 2.0)
     linear = predict(curve(), table(), {"finite_strain": 0.0}).value
     np.testing.assert_allclose(linear, hertz, rtol=1e-6, atol=1e-9)
@@ -128,8 +122,7 @@ def test_indentation_follows_hertz_displacement() -> None:
     assert half[-1] > 0.98 * hertz[-1]
 
 
-def test_compression_neo_hookean_displacement() -> None:
-    """A compression is neo hookean from displacement zero."""
+def test_a_compression_is_neo_hookean_from_displacement_zero() -> None:
     conditions = Conditions("block", SKIN, (CompressionConditions("c", 10.0, 20.0, DEPTH_MM),))
     stretch: Floats = 1.0 - DEPTH_MM / 10.0
     expected = 2.0 * np.pi / 4 * 20.0**2 * (stretch**-2 - stretch) / 3
@@ -187,8 +180,7 @@ def test_what_cannot_be_predicted_is_refused(
         ("load_cycles", -1.0),
     ],
 )
-def test_values_no_recording_refused_column(column: str, values: ArrayLike) -> None:
-    """Values that no recording can have are refused by their column."""
+def test_values_that_no_recording_can_have_are_refused_by_their_column(column: str, values: ArrayLike) -> None:
     columns: dict[str, Any] = {"indenter_radius_mm": 4.0, "preload_n": 1.0, "frequency_hz": 30.0, column: values}
     with pytest.raises(InvalidInput) as refused:
         frf_conditions(SKIN, **columns)
@@ -206,8 +198,7 @@ def test_values_no_recording_refused_column(column: str, values: ArrayLike) -> N
         ("poisson_ratio", 0.7),
     ],
 )
-def test_skin_cannot_refused_field(field: str, value: float) -> None:
-    """A skin that cannot be is refused by its field."""
+def test_a_skin_that_cannot_be_is_refused_by_its_field(field: str, value: float) -> None:
     changed: dict[str, Any] = {field: value}
     skin = replace(SKIN, **changed)
     with pytest.raises(InvalidInput) as refused:

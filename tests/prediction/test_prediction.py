@@ -55,8 +55,7 @@ def test_the_prototype_by_hand() -> None:
     assert reached.frf(D33) == pytest.approx(D33 * 1.5 * 0.36 * float(sigma.sigma), rel=1e-12)
 
 
-def test_stress_times_area_charge_over_d33() -> None:
-    """Stress times area is the charge over d33."""
+def test_stress_times_area_is_the_charge_over_d33() -> None:
     rows = ROWS
     reached = transmission(TABLE, *parts(rows))
     charge = reached.frf(D33) * rows["preload"]
@@ -73,14 +72,12 @@ def test_lengths_and_forces_scale_out() -> None:
     assert stress[1] == pytest.approx(stress[0], rel=1e-12)
 
 
-def test_light_touch_point_load_linear_layer() -> None:
-    """A light touch is a point load on the linear layer."""
+def test_a_light_touch_is_a_point_load_on_the_linear_layer() -> None:
     reached = transmission(TABLE, *prototype(), 1e-9)
     assert reached.sigma == pytest.approx(float(linear_layer.sigma(0.0, 0.6)), rel=1e-5)
 
 
-def test_sensor_three_times_wide_skin_thick() -> None:
-    """A sensor three times as wide as the skin is thick catches the force."""
+def test_a_sensor_three_times_as_wide_as_the_skin_is_thick_catches_the_force() -> None:
     reached = transmission(TABLE, *prototype(sensor_radius_mm=7.5), 0.1)
     assert reached.frf(D33) == pytest.approx(D33, rel=2e-3)
 

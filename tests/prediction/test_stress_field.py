@@ -43,26 +43,21 @@ def _disc_mean(r: Floats, values: Floats, radius: float) -> float:
 
 @pytest.mark.parametrize("poisson_ratio", [0.5, 0.45])
 @pytest.mark.parametrize("preload", [0.5, 3.0, 20.0])
-def test_mean_over_sensor_base_model_says(poisson_ratio: float, preload: float) -> None:
-    """The mean over the sensor is what the base model says."""
+def test_the_mean_over_the_sensor_is_what_the_base_model_says(poisson_ratio: float, preload: float) -> None:
     field = _field(poisson_ratio=poisson_ratio, preload_n=preload)
     mean = _disc_mean(field.r, field.sigma_zz[0, -1], 1.5e-3)
     assert mean == pytest.approx(-float(field.contact.mean_stress[0]), rel=2e-4)
 
 
-def test_sigma_compressible_layer_linear() -> None:
-    """Sigma of a compressible layer is the linear one."""
+def test_sigma_of_a_compressible_layer_is_the_linear_one() -> None:
     contact = _field(poisson_ratio=0.3).contact
     expected = elastic_layer.sigma(Layer(0.3), contact.a_over_h, 0.6)
     assert contact.sigma == pytest.approx(expected, rel=1e-12)
     assert np.isnan(contact.rel_error).all()
 
 
-def test_every_plane_bears_force_finite_strain() -> None:
-    """Every plane bears the force with finite strain too.
-
-    But for what lies beyond the section: up to 4 % on the base, by the table's own profile as by the field.
-    """
+def test_every_plane_bears_the_force_with_finite_strain_too() -> None:
+    """But for what lies beyond the section: up to 4 % on the base, by the table's own profile as by the field."""
     field = _field(radii=2001, thickness_mm=0.5, sensor_radius_mm=0.3, preload_n=20.0)
     contact = field.contact
     assert float(contact.load_parameter[0]) > 0.07
@@ -75,16 +70,14 @@ def test_every_plane_bears_force_finite_strain() -> None:
 
 
 @pytest.mark.parametrize("a", [0.2, 1.0, 2.5])
-def test_finite_strain_adds_base_no_force(a: float) -> None:
-    """What finite strain adds on the base has no force."""
+def test_what_finite_strain_adds_on_the_base_has_no_force(a: float) -> None:
     r = np.linspace(0.0, TABLE.profile_end, 2001)
     change = TABLE.profile(r, a, 0.1) - TABLE.profile(r, a, 0.0)
     assert 3 * np.trapezoid(np.abs(change) * r, r) > 0.02
     assert 3 * np.trapezoid(change * r, r) == pytest.approx(0.0, abs=1e-3)
 
 
-def test_surface_bears_hertz_pressure_base_table() -> None:
-    """The surface bears the hertz pressure and the base the table s stress."""
+def test_the_surface_bears_the_hertz_pressure_and_the_base_the_tables_stress() -> None:
     field = _field(preload_n=20.0)
     a = float(field.contact.contact_radius[0])
     assert -field.sigma_zz[0, 0] == pytest.approx(hertz.pressure(field.r, 20.0, a), rel=1e-9, abs=1.0)
@@ -104,8 +97,7 @@ def test_a_stiff_skin_is_the_exact_linear_layer() -> None:
     assert float(field.section_error[0]) < 2e-3
 
 
-def test_table_not_hold_not_extrapolated() -> None:
-    """What the table does not hold is not extrapolated."""
+def test_what_the_table_does_not_hold_is_not_extrapolated() -> None:
     skin = Skin.from_lab(thickness_mm=2.5, youngs_modulus_mpa=16.0, sensor_radius_mm=1.5)
     field = stress_field(TABLE, skin, Indenter(np.array(4e-3)), np.array([1.0, 200.0]), 21, 5)
     assert np.isfinite(field.sigma_zz[0]).all()
@@ -139,11 +131,8 @@ class _Open(NonlinearLayer):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("a", "load"), first(2, [(0.1, 0.004), (0.5, 0.01), (0.2, 0.02), (1.0, 0.004)]))
-def test_finite_elements_inside_layer_differ(a: float, load: float) -> None:
-    """The finite elements inside the layer differ by no more than is said.
-
-    The bound holds everywhere, and is not four times too wide at small contacts, where it was measured.
-    """
+def test_the_finite_elements_inside_the_layer_differ_by_no_more_than_is_said(a: float, load: float) -> None:
+    """The bound holds everywhere, and is not four times too wide at small contacts, where it was measured."""
     layer = _Open(discretise(layer_mesh(a, 1), 4))
     peak = float(peak_pressures(np.cbrt(np.array([load])))[0])
     state = layer.rest()

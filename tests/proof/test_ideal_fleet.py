@@ -7,8 +7,7 @@ from rig.joint import joint_campaigns
 
 
 @pytest.mark.slow
-def test_ideal_tells_departs_accuses() -> None:
-    """The ideal tells who departs and accuses no other."""
+def test_the_ideal_tells_who_departs_and_accuses_no_other() -> None:
     told, of, falsely = 0, 0, 0
     for number in range(12):
         joint = joint_campaigns(8, number, "skins")

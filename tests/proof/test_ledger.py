@@ -84,11 +84,8 @@ def test_grade(verdict: str, named: list[str], rivals: list[list[str]], grade: s
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_digests")
-def test_run_again_changes_nothing_moved_answer(tmp_path: Path) -> None:
-    """Run again changes nothing and a moved answer is shown.
-
-    The kept answer of a campaign comes back; where another had been kept, the difference is printed.
-    """
+def test_run_again_changes_nothing_and_a_moved_answer_is_shown(tmp_path: Path) -> None:
+    """The kept answer of a campaign comes back; where another had been kept, the difference is printed."""
     name = "51763-000"
     kept = next(
         line for line in map(json.loads, (LEDGER / "frf.jsonl").read_text().splitlines()) if line["name"] == name

@@ -51,8 +51,7 @@ def report(verdict: str, *names: str, probability: float = 0.9) -> dict[str, Any
         (report("explained", "a"), [], False),
     ],
 )
-def test_answer_right_exactly_truth(given: dict[str, Any], effects: list[str], right: bool) -> None:
-    """An answer is right if it is exactly the truth."""
+def test_an_answer_is_right_if_it_is_exactly_the_truth(given: dict[str, Any], effects: list[str], right: bool) -> None:
     truth = {"effects": effects, "identifiable": True, "chi2_gain_of_truth": 49.0}
     found = judge("c", given, truth)
     assert found.right is right
@@ -60,8 +59,7 @@ def test_answer_right_exactly_truth(given: dict[str, Any], effects: list[str], r
     assert found.held_out == (2.0, 1.0)
 
 
-def test_pair_visible_members() -> None:
-    """A pair is visible only if each of its members is."""
+def test_a_pair_is_visible_only_if_each_of_its_members_is() -> None:
     truth = {
         "effects": ["a", "b"],
         "identifiable": True,
@@ -72,8 +70,7 @@ def test_pair_visible_members() -> None:
     assert (found.kind, found.visible, found.one_visible) == ("pair", False, True)
 
 
-def test_twin_left_open_under_ambiguous() -> None:
-    """A twin is left open only under ambiguous."""
+def test_a_twin_is_left_open_only_under_ambiguous() -> None:
     truth = {"effects": ["twin"], "identifiable": True, "chi2_gain_of_truth": 90.0}
     for verdict in ("ambiguous", "explained"):
         found = judge("c", report(verdict, "a"), truth)
@@ -89,11 +86,9 @@ def test_drawn_cases_tell_nothing_of_the_truth() -> None:
     assert document["skin"]["d33_pc_per_n"] is None
 
 
-def test_every_effect_drawn_supposed() -> None:
-    """Every effect that is drawn can be supposed where it is.
-
-    The ideal diagnoser's laws reach the parameters that the rig draws, and no others of the same name.
-    """
+@pytest.mark.slow
+def test_every_effect_that_is_drawn_can_be_supposed_where_it_is() -> None:
+    """The ideal diagnoser's laws reach the parameters that the rig draws, and no others of the same name."""
     for number in range(60 if SOAK else 40):
         description = drawn(3, number)
         effects = parse_experiment(description).effects
@@ -103,8 +98,7 @@ def test_every_effect_drawn_supposed() -> None:
     assert not set(CATALOGUED) & set(UNKNOWN)
 
 
-def test_supposition_gives_back_effects_place() -> None:
-    """A supposition gives back the effects of its place."""
+def test_a_supposition_gives_back_the_effects_of_its_place() -> None:
     description = drawn(3, 1, "single")
     for name in ("misalignment", "thickness_error", "preload_dependent_d33"):
         for supposed in suppositions((name,), of_frf(description)):
@@ -114,8 +108,7 @@ def test_supposition_gives_back_effects_place() -> None:
 
 
 @pytest.mark.slow
-def test_ideal_diagnoser_names_plainly_shows() -> None:
-    """The ideal diagnoser names what plainly shows."""
+def test_the_ideal_diagnoser_names_what_plainly_shows() -> None:
     quiet = next(n for n in range(50) if _light(drawn(9, n, "none")))
     assert diagnosed(DrawnCase(9, quiet, "none"))["answer"] == []
 
@@ -146,8 +139,7 @@ def test_small_run_writes_page_goes_kept(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 @pytest.mark.soak
-def test_ideal_diagnoser_finds_twin_no_better() -> None:
-    """The ideal diagnoser finds a twin no better than the truth."""
+def test_the_ideal_diagnoser_finds_a_twin_no_better_than_the_truth() -> None:
     found = diagnosed(DrawnCase(7001, 12, "single"))
     assert set(drawn(7001, 12, "single")["effects"]) == {"amplitude_nonlinearity"}
     assert abs(found["chi2_over_rivals"]) < 3.0
@@ -155,8 +147,7 @@ def test_ideal_diagnoser_finds_twin_no_better() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_digests")
-def test_diagnosis_fails_wrong_answer(tmp_path: Path) -> None:
-    """A diagnosis that fails is a wrong answer."""
+def test_a_diagnosis_that_fails_is_a_wrong_answer(tmp_path: Path) -> None:
     [made] = reports(Work(tmp_path), [MadeCase("broken", {"schema": "campaign/1"})], lambda _, __: None)
     found = judge("broken", made, {"effects": [], "identifiable": True, "chi2_gain_of_truth": 0.0})
     assert not found.right
@@ -164,11 +155,8 @@ def test_diagnosis_fails_wrong_answer(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_paper_s_question_left_open_settle() -> None:
-    """The paper s question is left open and what would settle it is planned.
-
-    Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart.
-    """
+def test_the_papers_question_is_left_open_and_what_would_settle_it_is_planned() -> None:
+    """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
     made = paper_array.worlds()
     array = diagnose(parse(made["array"]), load_table())
     rivals = {"preload_dependent_d33", "ageing"}
@@ -184,11 +172,8 @@ def test_paper_s_question_left_open_settle() -> None:
 
 
 @pytest.mark.soak
-def test_settle_paper_s_question() -> None:
-    """What would settle the paper s question does.
-
-    Both preloads on late sensors: what did it is named.
-    """
+def test_what_would_settle_the_papers_question_does() -> None:
+    """Both preloads on late sensors: what did it is named."""
     made = paper_array.worlds()
     aged = diagnose(parse(made["array, then both preloads: age did it"]), load_table())
     assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}

@@ -36,8 +36,7 @@ AT_BOUNDS = DrawnCase(930001, 161, "pair", WIDE)  # a slow loss at its bound, wh
     ],
     ids=lambda case: case.name,
 )
-def test_hidden_sets_found_weighed_well_true(case: DrawnCase) -> None:
-    """Hidden sets are found and weighed as well as from true values."""
+def test_hidden_sets_are_found_and_weighed_as_well_as_from_true_values(case: DrawnCase) -> None:
     entry = compared(case)
     assert not is_miss(entry)
     own = entry["lost_own"]  # None where a better set was found before it
@@ -45,8 +44,7 @@ def test_hidden_sets_found_weighed_well_true(case: DrawnCase) -> None:
 
 
 @pytest.mark.slow
-def test_set_fitted_without_scatter_parent_needs() -> None:
-    """A set is also fitted without the scatter that its parent needs."""
+def test_a_set_is_also_fitted_without_the_scatter_that_its_parent_needs() -> None:
     entry = compared(MISLED)
     assert entry["found"] == entry["truth"] == ["sensor_spread", "thickness_error"]
     assert not is_miss(entry)

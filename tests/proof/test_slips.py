@@ -22,8 +22,7 @@ def recorded(effect: str, **values: Any) -> RecordedLines:
 
 
 @pytest.mark.soak
-def test_slips_few_campaigns_committed_named() -> None:
-    """Slips in a few campaigns are committed and named."""
+def test_slips_in_a_few_campaigns_are_committed_and_named() -> None:
     judged = [judged_campaign(900810, number) for number in (23, 7, 8)]
     assert not any(entry["false"] for entry in judged)
     committed = [(slip, one) for entry in judged for slip, one in entry["slips"].items()]
@@ -34,8 +33,8 @@ def test_slips_few_campaigns_committed_named() -> None:
     assert all(plain)
 
 
-def test_conjugated_delay_sign() -> None:
-    """A conjugated delay is one of the other sign."""
+@pytest.mark.slow
+def test_a_conjugated_delay_is_one_of_the_other_sign() -> None:
     made = recorded("timing_delay", delay_us=80.0)
     assert (4 * made.exact.imag**2 / made.line_variance).sum() > 100
     assert conjugated_residual(made) < 1.0
@@ -46,24 +45,19 @@ def test_conjugated_delay_sign() -> None:
     [("amplifier_high_pass", {"corner_hz": 1.5}), ("sensor_relaxation", {"law": "ladder", "exponent": 0.05})],
 )
 @pytest.mark.slow
-def test_conjugated_high_pass_relaxation_nothing(effect: str, values: dict[str, Any]) -> None:
-    """A conjugated high pass or relaxation is nothing else."""
+def test_a_conjugated_high_pass_or_relaxation_is_nothing_else(effect: str, values: dict[str, Any]) -> None:
     assert conjugated_residual(recorded(effect, **values)) > 20.0
 
 
-def test_third_conjugated_shows_two_signs_course() -> None:
-    """A third that is conjugated shows by two signs and one course does not."""
+def test_a_third_that_is_conjugated_shows_by_two_signs_and_one_course_does_not() -> None:
     made = recorded("timing_delay", delay_us=80.0)
     turned = np.arange(len(made.exact)) % 3 == 0
     assert over_one_sign(made, turned, 1 / 3) > 20.0
     assert over_one_sign(made, np.zeros_like(turned), 1 / 3) <= 0.0
 
 
-def test_exchange_cables_leaves_no_step_either() -> None:
-    """An exchange of cables leaves no more than a step of either sensor leaves.
-
-    Against least squares, with a level of each sensor and a step of one of the two.
-    """
+def test_an_exchange_of_cables_leaves_no_more_than_a_step_of_either_sensor_leaves() -> None:
+    """Against least squares, with a level of each sensor and a step of one of the two."""
     description = drawn(8, 3, "none")
     description["skin"]["array"] |= {"columns": 2, "rows": 2}
     description["design"].pop("offsets_mm", None)

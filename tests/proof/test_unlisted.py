@@ -41,8 +41,7 @@ def law(acts_on: str, axis: str, form: str, after: float = 2.2) -> dict[str, Any
     return {"acts_on": acts_on, "axis": axis, "form": form, "heldout_rmse_percent": {"before": 9.0, "after": after}}
 
 
-def test_equivalent_rig_cannot_tell_apart_right() -> None:
-    """An equivalent that the rig cannot tell apart is right."""
+def test_an_equivalent_that_the_rig_cannot_tell_apart_is_right() -> None:
     assert entry(law("modulus", "order", "linear"))["shaped"]
     assert entry(law("force", "recorded_at", "linear"))["shaped"]
     assert entry(law("force", "order", "power"))["placed"]
@@ -52,15 +51,13 @@ def test_equivalent_rig_cannot_tell_apart_right() -> None:
     assert not entry(None)["placed"]
 
 
-def test_probability_anything_missing_nothing() -> None:
-    """The probability that anything is missing is all but that of nothing."""
+def test_the_probability_that_anything_is_missing_is_all_but_that_of_nothing() -> None:
     assert entry(None)["missing"] == pytest.approx(0.96)
     assert entry(None, verdict="no_mismatch")["missing"] == pytest.approx(0.1)
 
 
 @pytest.mark.soak
-def test_campaigns_rig_read_diagnosed(tmp_path: Path) -> None:
-    """Campaigns of the rig are read and diagnosed."""
+def test_campaigns_of_the_rig_are_read_and_diagnosed(tmp_path: Path) -> None:
     names = ["0001", "0002"]
     result = judge_unlisted(Work(tmp_path, count=len(names)), lambda *_: None)
     assert [one["name"] for one in result["judged"]] == names

@@ -16,8 +16,8 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import parse
 
 
-def test_wide_tails_go_beyond_usual_ones_arrays() -> None:
-    """Wide tails go beyond the usual ones and have arrays of two."""
+@pytest.mark.slow
+def test_wide_tails_go_beyond_the_usual_ones_and_have_arrays_of_two() -> None:
     usual, wide = ([drawn(11, number, "none", tails) for number in range(80)] for tails in ("usual", WIDE))
     assert max(one["noise"]["gain"] for one in usual) <= 0.05 < max(one["noise"]["gain"] for one in wide) <= 0.08
     assert max(one["noise"]["position_mm"] for one in wide) > 0.4
@@ -30,8 +30,7 @@ def test_wide_tails_go_beyond_usual_ones_arrays() -> None:
 
 
 @pytest.mark.parametrize(("low", "high", "expected"), [(9.0, 11.0, True), (10.5, 11.0, False)])
-def test_interval_holds_true_d33(low: float, high: float, expected: bool) -> None:
-    """An interval holds the true d33 or does not."""
+def test_an_interval_holds_the_true_d33_or_does_not(low: float, high: float, expected: bool) -> None:
     case = DrawnCase(11, 3, "none", WIDE)
     true = case.description["skin"]["d33_pc_per_n"]
     stated = {"low": low * true / 10, "high": high * true / 10, "value": true, "quotable": True}
@@ -41,8 +40,7 @@ def test_interval_holds_true_d33(low: float, high: float, expected: bool) -> Non
     assert held(case, {"verdict": "unexplained", "mechanisms": [], "d33": None})["held"] is None
 
 
-def test_priors_last_long_context() -> None:
-    """Other priors last as long as their context."""
+def test_other_priors_last_as_long_as_their_context() -> None:
     campaign = parse(DrawnCase(11, 3, "none", WIDE).document())
     mechanism = CATALOGUE["thickness_error"]
     before = GAIN_PRIOR.row, dict(PRIORS), mechanism.parameters(campaign, "frf")

@@ -35,8 +35,7 @@ def report(
     }
 
 
-def test_error_named_measured_interval_value() -> None:
-    """An error that is named is measured by its interval and its value."""
+def test_an_error_that_is_named_is_measured_by_its_interval_and_its_value() -> None:
     found = compared(report((2.2, 2.4, 2.6)), TRUTH)
     assert found["named"]
     assert found["held"]
@@ -45,8 +44,7 @@ def test_error_named_measured_interval_value() -> None:
     assert not compared(report((2.6, 2.7, 2.8)), TRUTH)["held"]
 
 
-def test_cannot_told_apart_counts_grouped_sure() -> None:
-    """What cannot be told apart counts as grouped where it is sure."""
+def test_what_cannot_be_told_apart_counts_as_grouped_where_it_is_sure() -> None:
     twins = ("modulus_error", "moving_contact_edge")
     assert compared(report(None, twins), TRUTH)["grouped"]
     assert not compared(report(None, twins, 0.7), TRUTH)["grouped"]

@@ -106,8 +106,7 @@ ALL = tuple(Channel(f"in {label}", label, SAMPLES) for label in UNITS)
 
 
 @given(FORMULAS)
-def test_values_units_textbook(case: tuple[str, Measured]) -> None:
-    """Values and units are those of a textbook."""
+def test_values_and_units_are_those_of_a_textbook(case: tuple[str, Measured]) -> None:
     formula, expected = case
     whole = f"{formula} * ('in mm' / 'in mm')"  # a channel, also where all terms are constants
     assume(not expected.cancels)
@@ -154,16 +153,14 @@ def test_any_text_is_a_formula_or_is_refused(text: str) -> None:
         ("a[b][c]", "a[b][c]"),
     ],
 )
-def test_no_arithmetic_refused_term(formula: str, term: str) -> None:
-    """What is no arithmetic is refused by its term."""
+def test_what_is_no_arithmetic_is_refused_by_its_term(formula: str, term: str) -> None:
     with pytest.raises(InvalidInput) as refused:
         parse("derived.x", formula)
     assert refused.value.allowed.startswith(f"{term}: ")
 
 
 @pytest.mark.parametrize("formula", ["", "a -", "0.05 N/m * a", "(" * 150 + "a", "-" * 201, "a\\", "import os"])
-def test_cannot_parsed_refused_example(formula: str) -> None:
-    """What cannot be parsed is refused with an example."""
+def test_what_cannot_be_parsed_is_refused_with_an_example(formula: str) -> None:
     with pytest.raises(InvalidInput, match="must"):
         parse("derived.x", formula)
 

@@ -70,8 +70,7 @@ def test_channels_are_aligned_by_their_starts(late_us: int, offset_s: float) -> 
     )
 
 
-def test_starts_cannot_aligned_refused_times() -> None:
-    """Starts that cannot be aligned are refused with both times."""
+def test_starts_that_cannot_be_aligned_are_refused_with_both_times() -> None:
     with pytest.raises(
         FileError, match=r"'Force' starts at .*T10:00:00Z, 'Charge' at .*T10:00:00\.003400Z: .*3\.4 samples"
     ):
@@ -116,11 +115,8 @@ def lvm(
 
 @pytest.mark.parametrize("gaps", [True, False])
 @pytest.mark.parametrize("charge_unit", ["V", "mV"])
-def test_lvm_channel_unit_start(charge_unit: str, gaps: bool) -> None:
-    """Each lvm channel has its own unit and start.
-
-    The third channel is in its own unit; the rate is 1/Delta_X; the channels are aligned by X0.
-    """
+def test_each_lvm_channel_has_its_own_unit_and_start(charge_unit: str, gaps: bool) -> None:
+    """The third channel is in its own unit; the rate is 1/Delta_X; the channels are aligned by X0."""
     amplifier = {"channel": "Charge", "sensitivity": 10, "sensitivity_unit": "mV/pC"}
     data = lvm(["N", "uV", charge_unit], [0.0, 0.0, 0.02], gaps=gaps)
     assert [one.unit for one in contents(data, "m.lvm").blocks[0].channels] == ["N", "uV", charge_unit]

@@ -64,11 +64,8 @@ def test_a_relaxation_hold_turns_no_sign(sign: int) -> None:
         assert falling(sign * force, sign * depth, sphere=True) == expected
 
 
-def test_rows_deepest_air_read_backwards() -> None:
-    """Rows from the deepest to the air are read backwards.
-
-    Without times, rows of one way may have been stored in either order; nothing is called negative.
-    """
+def test_rows_from_the_deepest_to_the_air_are_read_backwards() -> None:
+    """Without times, rows of one way may have been stored in either order; nothing is called negative."""
     depth = ways(0.3, -0.1, samples=400)
     read = campaign(depth, pressed(depth), timed=False)
     assert only(read).code == "rows_reversed"
@@ -76,11 +73,8 @@ def test_rows_deepest_air_read_backwards() -> None:
 
 
 @pytest.mark.parametrize("corners", [(-0.1, 0.3), (-0.1, 0.3, -0.1)])
-def test_samples_saturated_channel_left(corners: tuple[float, ...]) -> None:
-    """Samples of a saturated channel are left out and named.
-
-    The force reads one number while the sphere goes on: it is no property of the sample.
-    """
+def test_samples_of_a_saturated_channel_are_left_out_and_named(corners: tuple[float, ...]) -> None:
+    """The force reads one number while the sphere goes on: it is no property of the sample."""
     depth = ways(*corners)
     force = np.minimum(pressed(depth), 0.75 * hertz(np.array(0.3)))
     finding = only(campaign(depth, force))
@@ -90,11 +84,8 @@ def test_samples_saturated_channel_left(corners: tuple[float, ...]) -> None:
 
 
 @pytest.mark.parametrize("corners", [(-0.1, 0.3, -0.1), (-0.1, 0.3, 0.3), (-0.1, 0.3, 0.3, 0.3, -0.1)])
-def test_quiet_zero_hold_hide_no_saturation(corners: tuple[float, ...]) -> None:
-    """A quiet zero and a hold hide no saturation.
-
-    The air reads one value for long, and the stage may hold while the channel saturates.
-    """
+def test_a_quiet_zero_and_a_hold_hide_no_saturation(corners: tuple[float, ...]) -> None:
+    """The air reads one value for long, and the stage may hold while the channel saturates."""
     depth = ways(*corners)
     force = np.minimum(np.round(pressed(depth) / 2e-3) * 2e-3, (0.75 * hertz(np.array(0.3))).round(3)).round(7)
     finding = only(campaign(depth, force))
@@ -271,8 +262,7 @@ def test_a_held_load_is_no_saturation(creep: float) -> None:
     assert "force_saturates" not in [one.code for one in implausible(campaign(depth, force))]
 
 
-def test_steps_converter_hold_no_saturation() -> None:
-    """Steps of a converter and a hold are no saturation."""
+def test_steps_of_a_converter_and_a_hold_are_no_saturation() -> None:
     depth = ways(-0.1, 0.3, 0.3, -0.1)
     steps = hertz(np.array(0.3)) / 60
     assert implausible(campaign(depth, np.round(pressed(depth) / steps) * steps)) == []
@@ -330,11 +320,8 @@ def test_spike_left_out(spike: float) -> None:
 
 
 @pytest.mark.parametrize("period_mm", [0.02, 0.045])
-def test_periodic_error_told_period_subtracted(period_mm: float) -> None:
-    """A periodic error is told with its period and subtracted.
-
-    Interference of 3 % of the largest force, in the air as well as in contact.
-    """
+def test_a_periodic_error_is_told_with_its_period_and_subtracted(period_mm: float) -> None:
+    """Interference of 3 % of the largest force, in the air as well as in contact."""
     depth = ways(-0.1, 0.3, -0.1, samples=400)
     force = pressed(depth)
     read = campaign(depth, force + 0.03 * force.max() * np.sin(2 * np.pi * depth / period_mm + 0.4))

@@ -22,8 +22,7 @@ def curve_of(reading: Reading) -> IndentationRecording:
     return recording
 
 
-def test_depth_force_derived_height_deflection() -> None:
-    """Depth and force are derived from height and deflection."""
+def test_depth_and_force_are_derived_from_height_and_deflection() -> None:
     reading = read(text_of_raw_curve())
     curve = curve_of(reading)
     np.testing.assert_allclose(curve.force_n, FORCE_N, atol=1e-11)
@@ -91,8 +90,7 @@ def test_a_sign_is_told_from_how_the_curve_goes() -> None:
 
 
 @pytest.mark.parametrize(("force", "travel"), [(1, 1), (-1, 1), (1, -1), (-1, -1)])
-def test_signs_block_told_largest_force(force: int, travel: int) -> None:
-    """The signs of a block are told from its largest force."""
+def test_the_signs_of_a_block_are_told_from_its_largest_force(force: int, travel: int) -> None:
     strain = np.concatenate([np.linspace(0, 0.2, 50), np.linspace(0.2, 0, 50)])
     rows = "".join(f"{travel * one:.6f};{force * 40 * one:.6f}\n" for one in strain)
     rig = rig_description.from_dict(
@@ -139,8 +137,7 @@ def test_signs_block_told_largest_force(force: int, travel: int) -> None:
         ),
     ],
 )
-def test_rig_description_cannot_mean_refused(changes: dict[str, Any], field: str, said: str) -> None:
-    """What a rig description cannot mean is refused."""
+def test_what_a_rig_description_cannot_mean_is_refused(changes: dict[str, Any], field: str, said: str) -> None:
     with pytest.raises(InvalidInput) as refused:
         rig_description.from_dict(rig_of_raw_curve(**changes))
     assert refused.value.field == field

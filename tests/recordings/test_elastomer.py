@@ -41,8 +41,7 @@ def test_the_papers_reading(toe: float, sign: int) -> None:
 
 
 @pytest.mark.slow
-def test_straight_curve_stays_straight() -> None:
-    """A straight curve stays straight and its uncertainty is the scatter seen."""
+def test_a_straight_curve_stays_straight_and_its_uncertainty_is_the_scatter_seen() -> None:
     random = np.random.default_rng(1)
     displacement = np.linspace(0, 1e-3, 300)
     force = 16e6 * displacement / HEIGHT * np.pi / 4 * DIAMETER**2
@@ -54,6 +53,7 @@ def test_straight_curve_stays_straight() -> None:
     assert 0.4 < errors.std() / stated < 1.1  # noise alone, and noise seen once more as a change of slope
 
 
+@pytest.mark.slow
 def test_unloading_is_not_read() -> None:
     strain = np.concatenate([np.linspace(0, 0.3, 300), np.linspace(0.3, 0, 300)])
     stress = paper_curve(strain) * np.where(np.arange(600) < 300, 1, 0.6)
@@ -67,8 +67,7 @@ def hertz(depth: Floats, modulus: float = 16e6, contact: float = 0.1e-3, offset:
 
 
 @pytest.mark.slow
-def test_indentation_finds_contact_modulus() -> None:
-    """Indentation finds contact and modulus and its interval covers."""
+def test_indentation_finds_contact_and_modulus_and_its_interval_covers() -> None:
     random = np.random.default_rng(2)
     depth = np.linspace(0, 0.4e-3, 200)
     hits = 0
@@ -81,16 +80,14 @@ def test_indentation_finds_contact_modulus() -> None:
     assert exact.contact_point == pytest.approx(0.1e-3, abs=1e-7)
 
 
-def test_recording_starts_contact_contact_point() -> None:
-    """A recording that starts in contact has its contact point before it."""
+def test_a_recording_that_starts_in_contact_has_its_contact_point_before_it() -> None:
     depth = np.linspace(0.15e-3, 0.5e-3, 200)
     found = indentation_modulus(depth, hertz(depth, offset=0.0), RADIUS, 0.5)
     assert found.contact_point == pytest.approx(0.1e-3, abs=1e-6)
     assert found.modulus == pytest.approx(16e6, rel=1e-3)
 
 
-def test_modulus_sample_contact_leaves_open() -> None:
-    """A modulus that one sample in contact leaves open is refused."""
+def test_a_modulus_that_one_sample_in_contact_leaves_open_is_refused() -> None:
     depth = np.linspace(0, 0.4e-3, 20)
     force = np.where(np.arange(20) == 19, 1.0, 0.0)
     with pytest.raises(InvalidInput, match="displacement_mm"):
@@ -166,6 +163,7 @@ def test_a_modulus_that_changes_with_strain(stretches: tuple[float, float], cons
     assert abs(found.modulus - 1e6) < 2 * found.uncertainty
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("toe", [0.02, 0.05, 0.1])
 @pytest.mark.parametrize("is_straight", [False, True])
 def test_an_uneven_end_is_no_change_of_the_modulus(toe: float, is_straight: bool) -> None:
@@ -173,12 +171,12 @@ def test_an_uneven_end_is_no_change_of_the_modulus(toe: float, is_straight: bool
     strain = np.linspace(0, 0.35, 300)
     seated = np.maximum(strain - np.linspace(0, toe, 200)[:, None], 0.0)
     stress = (seated if is_straight else ((1 - seated) ** -2 - (1 - seated)) / 3).mean(axis=0)
-    for seed in range(2):
-        found = of_sample(strain, stress, seed)
-        assert not found.is_series
-        assert found.modulus == pytest.approx(1e6, rel=0.06)
+    found = of_sample(strain, stress, seed=round(100 * toe))
+    assert not found.is_series
+    assert found.modulus == pytest.approx(1e6, rel=0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "stress", [np.linspace(0, 0.35, 300) ** 3, -np.expm1(np.linspace(0, 2, 300)) / 6], ids=["cube", "tension"]
 )

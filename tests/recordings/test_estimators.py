@@ -45,8 +45,7 @@ def factor(in_force: float, in_charge: float, estimator: Estimator) -> Floats:
     return np.abs(frf.values[low] / known_frf(frf.frequency[low]))
 
 
-def test_noise_charge_makes_h2_too_large_h1() -> None:
-    """Noise in the charge makes h2 too large and h1 not."""
+def test_noise_in_the_charge_makes_h2_too_large_and_h1_not() -> None:
     assert np.mean(factor(0, NOISE, "H1")) == pytest.approx(1, abs=0.005)
     frequency = (RATE * np.fft.rfftfreq(1000)[1:]).astype(np.float64)
     power = np.abs(known_frf(frequency)) ** 2
@@ -54,11 +53,8 @@ def test_noise_charge_makes_h2_too_large_h1() -> None:
     assert np.mean(factor(0, NOISE, "H2")) == pytest.approx(np.mean(1 + share), abs=0.005)
 
 
-def test_noise_equal_relative_power_hv_alone() -> None:
-    """With noise of equal relative power hv alone is right.
-
-    A system without dynamics: every line has the ratio of noise to signal that Hv assumes.
-    """
+def test_with_noise_of_equal_relative_power_hv_alone_is_right() -> None:
+    """A system without dynamics: every line has the ratio of noise to signal that Hv assumes."""
     random = np.random.default_rng(900_002)
     force = random.standard_normal(SAMPLES)
     noise = [NOISE * np.std(force) * random.standard_normal(SAMPLES) for _ in range(2)]
@@ -72,13 +68,10 @@ def test_noise_equal_relative_power_hv_alone() -> None:
 
 
 @pytest.mark.slow
-def test_hv_stepped_sine_takes_noise_ratio_tones() -> None:
-    """Hv of a stepped sine takes its noise ratio from all tones.
-
-    White noise in both channels with the ratio of the signals' powers over both tones. At 125 Hz the charge has a
+def test_hv_of_a_stepped_sine_takes_its_noise_ratio_from_all_tones() -> None:
+    """White noise in both channels with the ratio of the signals' powers over both tones. At 125 Hz the charge has a
     quarter of its magnitude at 10 Hz, so that a ratio of that tone's own powers would give the geometric mean of H1 and
-    H2, which is too large there.
-    """
+    H2, which is too large there."""
     force = dwelling([10.0, 125.0], cycles=300)
     charge, true = answer_to(force), np.abs(known_frf(np.array([10.0, 125.0])))
     random, noise, repeats = np.random.default_rng(910_001), 0.007, 40 if SOAK else 10
@@ -103,11 +96,8 @@ def test_hv_stepped_sine_takes_noise_ratio_tones() -> None:
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_stated_uncertainty_scatter_repeats(estimator: Estimator) -> None:
-    """The stated uncertainty is the scatter of repeats.
-
-    Of lines below 300 Hz, over records with noise in both channels; by a formula of first order in (1 − γ²)/n.
-    """
+def test_the_stated_uncertainty_is_the_scatter_of_repeats(estimator: Estimator) -> None:
+    """Of lines below 300 Hz, over records with noise in both channels; by a formula of first order in (1 − γ²)/n."""
     found, stated = [], []
     for seed in range(930_001, 930_013 if SOAK else 930_009):
         force, charge = (signal[: SAMPLES // 2] for signal in noisy(NOISE, NOISE, seed))
@@ -137,8 +127,7 @@ def estimated(recording: FrfRecording) -> Floats:
     return np.abs(lines_of(recording).values)
 
 
-def test_estimator_stays_recording_json_hdf5() -> None:
-    """The estimator stays with the recording in json hdf5 and the template."""
+def test_the_estimator_stays_with_the_recording_in_json_hdf5_and_the_template() -> None:
     campaign, _ = from_dict(document({**RECORDING, "estimator": "Hv"}))
     assert to_dict(campaign)["recordings"][0]["estimator"] == "Hv"
     buffer = io.BytesIO()
@@ -164,8 +153,7 @@ def test_estimator_stays_recording_json_hdf5() -> None:
         ({**LINES, "estimator": "Hv"}, "must be absent where there is no time series"),
     ],
 )
-def test_no_estimator_nothing_estimate_refused(entry: dict[str, Any], says: str) -> None:
-    """What is no estimator or has nothing to estimate is refused."""
+def test_what_is_no_estimator_or_has_nothing_to_estimate_is_refused(entry: dict[str, Any], says: str) -> None:
     _, (problem,) = from_dict(document(entry))
     assert (problem.field, problem.allowed) == ("estimator", says)
 
@@ -180,8 +168,7 @@ def of_rig(**changes: Any) -> FrfRecording:
     return read
 
 
-def test_rig_description_says_estimator() -> None:
-    """The rig description says the estimator of its recordings."""
+def test_the_rig_description_says_the_estimator_of_its_recordings() -> None:
     assert of_rig().estimator is None
     h1, h2, hv = (estimated(of_rig(estimator=name)) for name in ESTIMATORS)
     np.testing.assert_allclose(estimated(of_rig()), h1)
@@ -206,7 +193,6 @@ def test_rig_description_says_estimator() -> None:
         ),
     ],
 )
-def test_rig_description_refused_estimator(changes: dict[str, Any], field: str) -> None:
-    """A rig description is refused where its estimator cannot be used."""
+def test_a_rig_description_is_refused_where_its_estimator_cannot_be_used(changes: dict[str, Any], field: str) -> None:
     with pytest.raises(InvalidInput, match=f"^{field} = "):
         rig(**changes)

@@ -48,8 +48,7 @@ def curve(way: str, noise: float, *, exchanged: bool, unit: float = 1.0, seed: i
 
 @pytest.mark.parametrize("way", ["back", "held", "from contact", "in"])
 @pytest.mark.parametrize("noise", [0.003, 0.03])
-def test_exchanged_columns_curve_give_no_modulus(way: str, noise: float) -> None:
-    """Exchanged columns of a curve give no modulus."""
+def test_exchanged_columns_of_a_curve_give_no_modulus(way: str, noise: float) -> None:
     (found,) = elastomer.of_campaign(curve(way, noise, exchanged=True))
     assert isinstance(found.result, InvalidInput)
     assert "look exchanged" in str(found.result)
@@ -64,11 +63,8 @@ def test_a_diagnosis_names_exchanged_columns() -> None:
     assert "look exchanged" in report["statement"]
 
 
-def test_moves_like_physics_not_exchanged() -> None:
-    """What moves like that by physics is not exchanged.
-
-    A hold that relaxes before a way back; a force that is controlled; a drift before the press.
-    """
+def test_what_moves_like_that_by_physics_is_not_exchanged() -> None:
+    """A hold that relaxes before a way back; a force that is controlled; a drift before the press."""
     rng = np.random.default_rng(3)
     relaxing = np.concatenate([1 - 0.4 * (1 - np.exp(-np.arange(200) / 60)), np.linspace(0.6, 0.0, 100)])
     held = np.concatenate([np.full(200, 0.4), np.linspace(0.4, 0.1, 100)])
@@ -87,8 +83,7 @@ def test_moves_like_physics_not_exchanged() -> None:
 
 
 @pytest.mark.parametrize(("unit", "slip"), [(1e3, "N for mN"), (1e6, "N for µN"), (1e-3, "N for kN")])
-def test_slip_curve_s_force_told_reading(unit: float, slip: str) -> None:
-    """A slip of a curve s force is told at reading."""
+def test_a_slip_of_a_curves_force_is_told_at_reading(unit: float, slip: str) -> None:
     campaign = curve("back", 0.01, exchanged=False, unit=unit)
     (finding,) = plausibility.at_reading(campaign)
     assert finding.code == "units_off_by_1000"
@@ -125,49 +120,38 @@ def frfs(preloads: tuple[float, ...], radii: tuple[float, ...], modulus: float, 
     ("preloads", "radii", "modulus"),
     [((1.0, 2.0), (4.0, 10.0), 16.0), ((0.25, 0.5, 1.0), (4.0, 8.0), 2.0), ((0.5,), (5.0,), 1.0)],
 )
-def test_exchanged_preloads_spheres_give_no_d33(
+def test_exchanged_preloads_and_spheres_give_no_d33(
     table: SigmaTable, preloads: tuple[float, ...], radii: tuple[float, ...], modulus: float
 ) -> None:
-    """Exchanged preloads and spheres give no d33."""
     with pytest.raises(NoD33, match="or preload_n and indenter_radius_mm are exchanged"):
         invert(frfs(preloads, radii, modulus, exchanged=True), table)
     assert invert(frfs(preloads, radii, modulus, exchanged=False), table).campaign_d33 is not None
 
 
-def test_preloads_spheres_meant_used(table: SigmaTable) -> None:
-    """Preloads and spheres that are meant are used.
-
-    Of four loads that are meant one lies within the tables: its d33 is given, and the others are named.
-    """
+def test_preloads_and_spheres_that_are_meant_are_used(table: SigmaTable) -> None:
+    """Of four loads that are meant one lies within the tables: its d33 is given, and the others are named."""
     meant = replace(frfs((1.0, 2.0), (4.0, 10.0), 16.0, exchanged=True), units_checked=True)
     found = invert(meant, table)
     assert found.campaign_d33 is not None
     assert len(found.left_out) == 3
 
 
-def test_small_sphere_pressed_hard_not_exchanged(table: SigmaTable) -> None:
-    """A small sphere pressed hard is not exchanged.
-
-    R = 1 mm under 1 to 3 N: as one preload does not exceed the radius, what lies beyond the tables is left out.
-    """
+def test_a_small_sphere_pressed_hard_is_not_exchanged(table: SigmaTable) -> None:
+    """R = 1 mm under 1 to 3 N: as one preload does not exceed the radius, what lies beyond the tables is left out."""
     found = invert(frfs((1.0, 2.0, 3.0), (1.0,), 16.0, exchanged=False), table)
     assert found.recordings.inside.tolist() == [True, False, False]
     assert len(found.left_out) == 2
 
 
-def test_diagnosis_names_exchanged_preloads() -> None:
-    """A diagnosis names exchanged preloads and spheres."""
+def test_a_diagnosis_names_exchanged_preloads_and_spheres() -> None:
     report = diagnose(frfs((1.0, 2.0), (4.0, 10.0), 16.0, exchanged=True))
     assert report["verdict"] == "insufficient_data"
     assert "or preload_n and indenter_radius_mm are exchanged" in report["statement"]
 
 
 @pytest.mark.parametrize("strain", [0.02, 0.3])
-def test_displacement_begins_late_not_exchanged(strain: float) -> None:
-    """A displacement that begins late is not exchanged.
-
-    An extensometer with play reads zero at first; a force at zero before contact is told none the less.
-    """
+def test_a_displacement_that_begins_late_is_not_exchanged(strain: float) -> None:
+    """An extensometer with play reads zero at first; a force at zero before contact is told none the less."""
     rng = np.random.default_rng(5)
     steady = np.linspace(-0.2, 1.0, 500)
     strains = strain * np.maximum(steady, 0.0)
@@ -182,11 +166,8 @@ def test_displacement_begins_late_not_exchanged(strain: float) -> None:
         assert are_exchanged(CompressionRecording("block", 10.0, 10.0, displacement, force_n=force)) == expected
 
 
-def test_block_pressed_height_gives_no_modulus() -> None:
-    """A block pressed by more than its height gives no modulus.
-
-    Force and displacement of a block of 10 mm are exchanged: the "displacement" is 18 mm.
-    """
+def test_a_block_pressed_by_more_than_its_height_gives_no_modulus() -> None:
+    """Force and displacement of a block of 10 mm are exchanged: the "displacement" is 18 mm."""
     travel = np.linspace(0, 1, 60)
     columns = {"displacement_mm": (18 * travel).tolist(), "force_n": travel.tolist()}
     block = {"id": "b", "kind": "compression", "sample_height_mm": 10, "sample_diameter_mm": 12, **columns}

@@ -126,10 +126,9 @@ def compression_machine(locale: Locale) -> Export:
 
 def units_behind_names(locale: Locale) -> Export:
     """Names with units, nothing else (MTS, LabVIEW tables)."""
+    lacks = "sample_length_mm" if locale["travel"] == "Extension" else "indenter_radius_mm"
     columns = curve(locale)
-    return Export(
-        [locale.joined(*bracketed(columns)), *locale.rows(*numbers(columns))], columns, lacks="indenter_radius_mm"
-    )
+    return Export([locale.joined(*bracketed(columns)), *locale.rows(*numbers(columns))], columns, lacks=lacks)
 
 
 def nanoindenter(locale: Locale) -> Export:

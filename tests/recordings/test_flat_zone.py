@@ -88,11 +88,8 @@ def test_a_flat_campaign_is_flat_throughout() -> None:
 
 
 @pytest.mark.parametrize(("excited_hz", "told"), [((20.0, 1e4), "below"), ((0.0, 9.0), "above")])
-def test_not_excited_no_flat_zone_however_wide(excited_hz: tuple[float, float], told: str) -> None:
-    """What was not excited is no flat zone however wide.
-
-    Uncorrelated noise over noise is as flat as a response where it is averaged long, and lies elsewhere.
-    """
+def test_what_was_not_excited_is_no_flat_zone_however_wide(excited_hz: tuple[float, float], told: str) -> None:
+    """Uncorrelated noise over noise is as flat as a response where it is averaged long, and lies elsewhere."""
     frequency = np.geomspace(0.2, 300.0, 400)
     follows = (frequency >= excited_hz[0]) & (frequency <= excited_hz[1])
     frfs, conditions = recorded(frequency, "")
@@ -112,11 +109,8 @@ def test_not_excited_no_flat_zone_however_wide(excited_hz: tuple[float, float], 
     assert "whole recorded range" not in zone.reason
 
 
-def test_force_few_sines_leaves_out_lines() -> None:
-    """A force of a few sines leaves out the lines between them.
-
-    One line in twenty is excited; between them the charge is noise, which nothing makes follow the force.
-    """
+def test_a_force_of_a_few_sines_leaves_out_the_lines_between_them() -> None:
+    """One line in twenty is excited; between them the charge is noise, which nothing makes follow the force."""
     frequency = np.arange(1.0, 301.0)
     sines = frequency % 20 == 0
     frfs, conditions = recorded(frequency, "")
@@ -159,8 +153,7 @@ def test_sine_mains_beside_idle_lines_no_pick() -> None:
     assert first.frequency_hz.tolist() == frequency[sines].tolist()
 
 
-def test_lowest_resonances_ends_zone_named() -> None:
-    """The lowest of the resonances ends the zone and is named."""
+def test_the_lowest_of_the_resonances_ends_the_zone_and_is_named() -> None:
     zone = zone_of("resonance")
     assert 40 < zone.high_hz < 110  # 1/(1 − (f/400)²) has risen by 1 % to 8 %
     assert zone.low_hz == LOG_GRID[0]
@@ -173,8 +166,7 @@ def test_a_rise_to_the_last_line_is_no_peak() -> None:
     assert "the response rises or scatters by more than 2 %, without a peak in range" in zone_of("rise").reason
 
 
-def test_high_pass_begins_relaxation_not_end() -> None:
-    """A high pass begins it and a relaxation does not end it."""
+def test_a_high_pass_begins_it_and_a_relaxation_does_not_end_it() -> None:
     zone = zone_of("high-pass")
     assert 4 < zone.low_hz < 20  # corner at 2 Hz: Re = 0.8 at 4 Hz, 0.99 at 20 Hz
     assert "high-pass" in zone.reason
@@ -183,8 +175,7 @@ def test_high_pass_begins_relaxation_not_end() -> None:
     assert "fall alike, by 6." in relaxing.reason
 
 
-def test_mains_lines_left_out_not_end() -> None:
-    """Mains lines are left out and do not end it."""
+def test_mains_lines_are_left_out_and_do_not_end_it() -> None:
     frfs, conditions = recorded(LINEAR_GRID[:200], "mains")
     zone = flat_zone(stacked(frfs), conditions)
     assert (zone.low_hz, zone.high_hz) == (1, 200)
@@ -247,8 +238,7 @@ def test_the_users_band_overrides() -> None:
 
 
 @pytest.mark.parametrize("with_coherence", [True, False])
-def test_uncertainty_average_scatter_coherence(with_coherence: bool) -> None:
-    """The uncertainty of an average is its scatter and coherence lowers it."""
+def test_the_uncertainty_of_an_average_is_its_scatter_and_coherence_lowers_it(with_coherence: bool) -> None:
     random = np.random.default_rng(6)
     noise = np.where(np.arange(100) < 50, 0.002, 0.03)
     gamma2 = 1 / (1 + 2 * 16 * noise**2) if with_coherence else None
@@ -283,8 +273,7 @@ def test_concealed_campaigns(name: str, low: tuple[float, float], high: tuple[fl
     assert high[0] <= zone.high_hz <= high[1]
 
 
-def test_resonance_above_zone_puts_average_told() -> None:
-    """What a resonance above the zone puts into the average is told."""
+def test_what_a_resonance_above_the_zone_puts_into_the_average_is_told() -> None:
     frfs, conditions = recorded(np.arange(1.0, 401.0), "resonance", line=0.001)
     stacks = stacked(frfs)
     zone = flat_zone(stacks, conditions)

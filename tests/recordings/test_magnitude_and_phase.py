@@ -35,8 +35,7 @@ def read(phase: str, values: tuple[float, ...], unit: str | None = None) -> Any:
 
 
 @pytest.mark.parametrize(("phase", "unit"), [("Phase [deg]", None), ("Phase [rad]", None), ("Phase", "°")])
-def test_magnitude_phase_parts_frf(phase: str, unit: str | None) -> None:
-    """Magnitude and phase are both parts of the frf."""
+def test_magnitude_and_phase_are_both_parts_of_the_frf(phase: str, unit: str | None) -> None:
     degrees = np.array([-1, -5, -90])
     reading = read(phase, tuple(np.radians(degrees) if "rad" in phase else degrees), unit)
     (recording,) = reading.campaign.recordings
@@ -45,8 +44,7 @@ def test_magnitude_phase_parts_frf(phase: str, unit: str | None) -> None:
     np.testing.assert_allclose(frf, np.array([7, 8, 20]) * np.exp(1j * np.radians(degrees)), rtol=1e-5, atol=1e-5)
 
 
-def test_phase_without_unit_refused() -> None:
-    """A phase without a unit or with another is refused."""
+def test_a_phase_without_a_unit_or_with_another_is_refused() -> None:
     with pytest.raises(FileError, match="has no unit in the file"):
         read("Phase", (-1, -5, -90))
     with pytest.raises(FileError, match="a phase is in deg or rad"):

@@ -64,8 +64,7 @@ def test_plain_numbers_are_taken_at_once(separator: str, decimal: str) -> None:
     assert plain_numbers(lines, separator, decimal, 2) is not None
 
 
-def test_index_trailing_separators_long_template() -> None:
-    """An index and trailing separators of a long template are passed over."""
+def test_an_index_and_trailing_separators_of_a_long_template_are_passed_over() -> None:
     columns = "indenter_radius_mm,preload_n,dynamic_force_n,frequency_hz,frf_re_pc_per_n,frf_im_pc_per_n"
     lines = [*ABOVE.splitlines(), f"Unnamed: 0,id,sensor,{columns}"]
     for number in range(300):

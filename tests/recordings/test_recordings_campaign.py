@@ -22,9 +22,9 @@ def test_every_kind_comes_back_as_it_went_in() -> None:
     assert json.loads(json_file.write(campaign)) == EVERYTHING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", ["open", "sealed"])
-def test_concealed_campaigns_come_back_went(part: str) -> None:
-    """The concealed campaigns come back as they went in."""
+def test_the_concealed_campaigns_come_back_as_they_went_in(part: str) -> None:
     folder = os.environ.get("UNDERSKIN_CAMPAIGNS")
     if folder is None:
         pytest.skip("UNDERSKIN_CAMPAIGNS names no folder of campaigns")
@@ -79,10 +79,9 @@ def test_concealed_campaigns_come_back_went(part: str) -> None:
         (COMPRESSION, "sample_diameter_mm", None, "sample_diameter_mm", "required"),
     ],
 )
-def test_bad_field_named_good_recordings_stay(
+def test_a_bad_field_is_named_and_the_good_recordings_stay(
     recording: dict[str, Any], field: str, value: Any, place: str, allowed: str
 ) -> None:
-    """A bad field is named and the good recordings stay."""
     campaign, problems = from_dict(document({**FRF, "id": "good"}, {**recording, field: value}))
     assert [kept.id for kept in campaign.recordings] == ["good"]
     assert [problem.field for problem in problems] == [place]
@@ -91,8 +90,7 @@ def test_bad_field_named_good_recordings_stay(
     json.dumps(problems[0].value, allow_nan=False)
 
 
-def test_wrong_recording_said_once() -> None:
-    """All that is wrong with a recording is said at once."""
+def test_all_that_is_wrong_with_a_recording_is_said_at_once() -> None:
     _, problems = from_dict(document(FRF, {**FRF, "id": "r2", "preload_n": -1, "sensor": None, "x": 1}))
     assert {problem.field for problem in problems} == {"preload_n", "sensor", "x"}
     assert {problem.recording for problem in problems} == {"r2"}
@@ -101,8 +99,7 @@ def test_wrong_recording_said_once() -> None:
     assert [problem.field for problem in problems] == ["preload_n", "sensor", "frf_im_pc_per_n"]
 
 
-def test_thousands_unknown_fields_said() -> None:
-    """Of thousands of unknown fields some are said."""
+def test_of_thousands_of_unknown_fields_some_are_said() -> None:
     _, problems = from_dict(document(FRF, {**FRF, "id": "r2", **{f"x{number}": 1 for number in range(5000)}}))
     assert 1 <= len(problems) < 100
     assert {problem.recording for problem in problems} == {"r2"}
@@ -127,8 +124,7 @@ def test_sensors_counted_from_0_and_from_1(in_skin: tuple[int, ...], used: tuple
     assert [problem.field for problem in from_dict(counted((*in_skin, 9)))[1]] == ["sensor"]
 
 
-def test_id_given_twice_refused_second_time() -> None:
-    """An id given twice is refused the second time."""
+def test_an_id_given_twice_is_refused_the_second_time() -> None:
     campaign, problems = from_dict(document(FRF, FRF))
     assert len(campaign.recordings) == 1
     assert [(problem.recording, problem.field) for problem in problems] == [("r1", "id")]
@@ -152,15 +148,13 @@ def test_id_given_twice_refused_second_time() -> None:
         ({"units_checked": 1}, "units_checked"),
     ],
 )
-def test_campaign_cannot_used_refused_field(change: dict[str, Any], field: str) -> None:
-    """A campaign that cannot be used is refused by field."""
+def test_a_campaign_that_cannot_be_used_is_refused_by_field(change: dict[str, Any], field: str) -> None:
     with pytest.raises(InvalidInput) as refusal:
         from_dict(document(FRF, **change))
     assert refusal.value.field == field
 
 
-def test_unknown_modulus_allowed_elastomer() -> None:
-    """An unknown modulus is allowed where only the elastomer is measured."""
+def test_an_unknown_modulus_is_allowed_where_only_the_elastomer_is_measured() -> None:
     bare = {
         "schema": "campaign/1",
         "name": "c",
@@ -170,15 +164,13 @@ def test_unknown_modulus_allowed_elastomer() -> None:
     assert to_dict(parse(bare))["skin"] == {"poisson_ratio": 0.5, "youngs_modulus_mpa": None, "d33_pc_per_n": None}
 
 
-def test_unlikely_magnitudes_pass_units_checked() -> None:
-    """Unlikely magnitudes pass when the units were checked."""
+def test_unlikely_magnitudes_pass_when_the_units_were_checked() -> None:
     small = {**FRF, "indenter_radius_mm": 0.007}
     assert from_dict(document(FRF, small, units_checked=False))[1]
     assert not from_dict(document(small, units_checked=True))[1]
 
 
-def test_strict_reading_stops_first_bad() -> None:
-    """The strict reading stops at the first bad recording."""
+def test_the_strict_reading_stops_at_the_first_bad_recording() -> None:
     with pytest.raises(InvalidInput, match=r"recordings\[r1\].preload_n = -1"):
         parse(document({**FRF, "preload_n": -1}))
 
@@ -192,8 +184,7 @@ def test_strict_reading_stops_first_bad() -> None:
         (b"[" * 100_000, "line 1"),
     ],
 )
-def test_not_json_refused_place(data: bytes, place: str) -> None:
-    """What is not json is refused with its place."""
+def test_what_is_not_json_is_refused_with_its_place(data: bytes, place: str) -> None:
     with pytest.raises(FileError, match=r"lab\.json: " + place):
         json_file.document(data, "lab.json")
 

@@ -57,15 +57,13 @@ def refusal(text: str) -> FileError:
         ("name,palm 3", 'name,"palm" 3', "line 2", "in quotes must end on its line"),
     ],
 )  # fmt: skip
-def test_lost_refused_line_column(old: str, new: str, place: str, reason: str) -> None:
-    """What would be lost is refused by line and column."""
+def test_what_would_be_lost_is_refused_by_line_and_column(old: str, new: str, place: str, reason: str) -> None:
     found = refusal(changed(old, new))
     assert found.place.startswith(place)
     assert reason in found.reason
 
 
-def test_cells_quotes_hold_separators_quotes() -> None:
-    """Cells in quotes hold separators and quotes."""
+def test_cells_in_quotes_hold_separators_and_quotes() -> None:
     quoted = changed("name,palm 3", 'name,"palm 3, ""May"""')
     assert read(quoted).campaign.name == 'palm 3, "May"'
     assert read(quoted.replace("preload_n", '"preload_n"')).campaign.recordings[0].id == "r1"
@@ -82,14 +80,12 @@ def test_cells_quotes_hold_separators_quotes() -> None:
         ),
     ],
 )
-def test_decimal_commas_beside_separators_quotes(text: str) -> None:
-    """Decimal commas beside other separators and in quotes."""
+def test_decimal_commas_beside_other_separators_and_in_quotes(text: str) -> None:
     skin = read(text).campaign.skin
     assert (skin.thickness_mm, skin.poisson_ratio, skin.sensor_radius_mm) == (2.5, 0.5, 1.5)
 
 
-def test_three_decimals_after_decimal_comma() -> None:
-    """Three decimals after a decimal comma are no thousands."""
+def test_three_decimals_after_a_decimal_comma_are_no_thousands() -> None:
     semicolons = PLAIN.replace(",", ";").replace(".", ",").replace("skin,", "skin.")
     assert read(changed(";16\n", ";16,000\n", semicolons)).campaign.skin.youngs_modulus_mpa == 16
     tabs = PLAIN.replace(",", "\t")
@@ -110,8 +106,7 @@ def test_thousands_before_a_decimal_mark() -> None:
             read(changed(";16\n", f";{cell}\n", semicolons))
 
 
-def test_decimal_point_among_decimal_commas() -> None:
-    """A decimal point among decimal commas is refused with what is written."""
+def test_a_decimal_point_among_decimal_commas_is_refused_with_what_is_written() -> None:
     semicolons = PLAIN.replace(",", ";").replace(".", ",").replace("skin,", "skin.")
     found = read(semicolons + "r2;s01;4;1.5;0,09;10;7,1;-0,5\n")
     assert [recording.id for recording in found.campaign.recordings] == ["r1"]
@@ -120,8 +115,7 @@ def test_decimal_point_among_decimal_commas() -> None:
     assert "line 12, column 4; decimals of this file are written with a comma" in problem.allowed
 
 
-def test_recording_begins_twice_refused() -> None:
-    """A recording that begins twice is refused."""
+def test_a_recording_that_begins_twice_is_refused() -> None:
     other = "r2,s01,4,2.0,0.09,10,7.1,-0.5\n"
     apart = refusal(PLAIN + other + "r1,,,,,40,7.1,-0.5\n")
     assert apart.place == "line 13, column 1"
@@ -131,8 +125,7 @@ def test_recording_begins_twice_refused() -> None:
 
 
 @pytest.mark.parametrize("heading", ["preload_n", "position_x_mm"])
-def test_value_changes_within_recording_refused(heading: str) -> None:
-    """A value that changes within a recording is refused."""
+def test_a_value_that_changes_within_a_recording_is_refused(heading: str) -> None:
     headings = HEADINGS.replace("preload_n", "preload_n,position_x_mm,position_y_mm")
     table = ABOVE + headings + "r1,s01,4,1.0,0,0,0.09,10,7.1,-0.5\n{},20,7.2,-0.6\n"
     cells = {"preload_n": ",,,2,,,", "position_x_mm": ",,,,1,,"}
@@ -159,8 +152,7 @@ def channels(text: str) -> Contents:
         ('"1,5","2,5"\n"3,5","4,5"\n', ""),
     ],
 )
-def test_quoted_numbers_instruments_never_split(text: str, place: str) -> None:
-    """Quoted numbers of instruments are never split."""
+def test_quoted_numbers_of_instruments_are_never_split(text: str, place: str) -> None:
     with pytest.raises(FileError) as refused:
         read_contents(text.encode(), "run.csv")
     assert refused.value.place == place

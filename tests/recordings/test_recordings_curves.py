@@ -47,8 +47,7 @@ def the_curve(reading: Reading) -> IndentationRecording:
 RAW = {"Piezo (um)": TRAVEL_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
 
 
-def test_force_depth_travel_deflection_spring() -> None:
-    """Force and depth from travel deflection and spring constant."""
+def test_force_and_depth_from_travel_deflection_and_spring_constant() -> None:
     recording = the_curve(read(table(RAW), SPRING))
     assert recording.stage_stiffness_n_per_mm == pytest.approx(0.05)  # 50 N/m: contact that sticks comes off by it
     stated = the_curve(read(table(RAW), SPRING, recording={"stage_stiffness_n_per_mm": 0.2}))
@@ -60,8 +59,7 @@ def spring_from(name: str) -> dict[str, Any]:
     return {**SPRING, "force_n": {"channel": "Deflection (nm)", "spring_constant_n_per_m": {"property": name}}}
 
 
-def test_file_state_spring_constant_unit() -> None:
-    """The file may state the spring constant in a unit of its own."""
+def test_the_file_may_state_the_spring_constant_in_a_unit_of_its_own() -> None:
     for name, value in (("k (N/m)", "50"), ("k [N/mm]", "0.05"), ("spring constant", "50")):
         the_curve(read(table(RAW, (f"{name};{value}", "")), spring_from(name)))
     with pytest.raises(FileError, match=r"property 'k \(N\)': its unit 'N' is not one of force/length, such as N/m"):
@@ -70,11 +68,8 @@ def test_file_state_spring_constant_unit() -> None:
         read(table(RAW, ("k;soft", "")), spring_from("k"))
 
 
-def test_travel_deflection_signs_sensitivities() -> None:
-    """Travel and deflection have signs and sensitivities of their own.
-
-    A height that falls when pressing, and a photodiode whose volts fall: 25 nm/V is 0.04 V/nm.
-    """
+def test_travel_and_deflection_have_signs_and_sensitivities_of_their_own() -> None:
+    """A height that falls when pressing, and a photodiode whose volts fall: 25 nm/V is 0.04 V/nm."""
     raw = {"Height (um)": -TRAVEL_UM, "Diode (V)": -1e3 * DEFLECTION_UM / 25}
     for sensitivity, unit in ((25, "nm/V"), (0.04, "V/nm")):
         diode = {"channel": "Diode (V)", "sign": -1, "sensitivity": sensitivity, "sensitivity_unit": unit}
@@ -85,11 +80,8 @@ def test_travel_deflection_signs_sensitivities() -> None:
         the_curve(read(table(raw), channels))
 
 
-def test_heading_s_wrong_unit_overridden_rig() -> None:
-    """A heading s wrong unit is overridden by the rig that names it.
-
-    Its heading says nm and means um.
-    """
+def test_a_headings_wrong_unit_is_overridden_by_the_rig_that_names_it() -> None:
+    """Its heading says nm and means um."""
     text = table({"Depth (nm)": DEPTH_UM, "Force (uN)": FORCE_UN})
     confirmed = read(text, {**SIMPLE, "displacement_mm": {"channel": "Depth (nm)", "unit": "um"}})
     the_curve(confirmed)
@@ -113,8 +105,7 @@ def each_is_the_curve(reading: Reading, ids: list[str]) -> None:
         the_curve(Reading(type(reading.campaign)("x", reading.campaign.skin, (one,)), [], []))
 
 
-def test_curves_apart_blank_lines_many() -> None:
-    """Curves apart by blank lines are so many recordings where the rig says so."""
+def test_curves_apart_by_blank_lines_are_so_many_recordings_where_the_rig_says_so() -> None:
     text = "\n".join([LINES[0], *LINES[1:], "", *LINES[1:], "", *LINES[1:]])
     reading = read(text, SIMPLE, curves="groups")
     each_is_the_curve(reading, ["curve 1", "curve 2", "curve 3"])
@@ -128,8 +119,7 @@ def test_curves_apart_blank_lines_many() -> None:
     assert "say curves: groups" in unsaid.warnings[0]
 
 
-def test_curves_under_headings_recordings() -> None:
-    """Curves under headings of their own are recordings and may be one."""
+def test_curves_under_headings_of_their_own_are_recordings_and_may_be_one() -> None:
     text = "\n".join(line for point in ("p1", "p2") for line in (f"Point;{point}", *LINES, ""))
     recording = {"id": {"property": "Point"}}
     each_is_the_curve(read(text, SIMPLE, recording=recording), ["p1", "p2"])
@@ -138,8 +128,7 @@ def test_curves_under_headings_recordings() -> None:
     the_curve(read(halves, SIMPLE, curves="file"))
 
 
-def test_channel_tell_curves_segments_apart() -> None:
-    """A channel may tell curves or segments apart."""
+def test_a_channel_may_tell_curves_or_segments_apart() -> None:
     length = len(DEPTH_UM)
     twice = {name: np.tile(values, 2) for name, values in ONE.items()}
     numbered = table({"Cycle": np.repeat([4.0, 7.0], length), **twice})
@@ -176,8 +165,7 @@ def test_channel_tell_curves_segments_apart() -> None:
         ({"force_n": {"channel": "F", "spring_constant_n_per_m": 0}}, "must be greater than 0"),
     ],
 )
-def test_rig_contradicts_itself_refused_field(change: dict[str, Any], message: str) -> None:
-    """A rig that contradicts itself is refused by field."""
+def test_a_rig_that_contradicts_itself_is_refused_by_field(change: dict[str, Any], message: str) -> None:
     curves = {"curves": change.pop("curves")} if "curves" in change else {}
     with pytest.raises(InvalidInput, match=message):
         read(table(ONE), {**SIMPLE, **change}, **curves)

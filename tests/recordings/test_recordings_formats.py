@@ -48,8 +48,7 @@ def test_a_campaign_in_csv() -> None:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
-def test_template_spreadsheet_country_saves(encoding: str) -> None:
-    """The template as a spreadsheet of another country saves it."""
+def test_the_template_as_a_spreadsheet_of_another_country_saves_it(encoding: str) -> None:
     filled = (EXAMPLES / "template.csv").read_text()
     foreign = re.sub(r"(?<=\d)\.(?=\d)", ",", filled.replace(",", ";")).replace("\n", "\r\n")
     foreign = foreign.replace("indenter_radius_mm;preload_n", "Indenter radius (µm);Preload [mN]")
@@ -70,8 +69,7 @@ def test_template_spreadsheet_country_saves(encoding: str) -> None:
         (",0.99\n", ",0.99,7\n", "line 13", "10 cells under 9 headings"),
     ],
 )
-def test_template_filled_wrongly_refused_line(old: str, new: str, place: str, reason: str) -> None:
-    """A template filled in wrongly is refused by line."""
+def test_a_template_filled_in_wrongly_is_refused_by_line(old: str, new: str, place: str, reason: str) -> None:
     wrong = (EXAMPLES / "template.csv").read_text().replace(old, new, 1)
     with pytest.raises(FileError, match=reason) as refusal:
         read_file(wrong.encode(), "wrong.csv")
@@ -100,8 +98,7 @@ def test_tdms() -> None:
 
 
 @pytest.mark.parametrize("lost", ["bytes", "length"])
-def test_interrupted_tdms_acquisition_read(lost: str) -> None:
-    """An interrupted tdms acquisition is read up to the last whole segment."""
+def test_an_interrupted_tdms_acquisition_is_read_up_to_the_last_whole_segment(lost: str) -> None:
     whole = tdms(4)
     last = whole.rindex(b"TDSm")
     cut = whole[:-5] if lost == "bytes" else whole[: last + 12] + b"\xff" * 8 + whole[last + 20 :]
@@ -189,8 +186,7 @@ def test_matlab(write: Any) -> None:
         (b"    -1\n    58\nx\n    -1\n", "dataset 1"),
     ],
 )
-def test_no_recording_refused_content(data: bytes, reason: str) -> None:
-    """What is no recording is refused by its content."""
+def test_what_is_no_recording_is_refused_by_its_content(data: bytes, reason: str) -> None:
     with pytest.raises(FileError, match=reason) as refusal:
         read_file(data, "run.csv")
     assert refusal.value.file == "run.csv"

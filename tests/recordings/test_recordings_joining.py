@@ -43,8 +43,7 @@ def ids(found: Reading) -> list[str]:
     return [recording.id for recording in found.campaign.recordings]
 
 
-def test_recordings_sensors_files_campaign() -> None:
-    """Recordings and sensors of all files are one campaign."""
+def test_recordings_and_sensors_of_all_files_are_one_campaign() -> None:
     files = [
         ("1.tdms", reading(press("a", "s1", 7.0))),
         ("2.tdms", reading(press("b", "s2", 7.1), press("c", "s1", 7.2))),
@@ -81,8 +80,7 @@ def test_files_of_different_skins_are_not_joined(skin: dict[str, Any], says: str
         join("both", [("a.csv", reading(press("a"), id="palm-3")), ("b.csv", reading(press("b"), **skin))])
 
 
-def test_ids_several_files_use_led_files_name() -> None:
-    """Ids that several files use are led by the files name."""
+def test_ids_that_several_files_use_are_led_by_the_files_name() -> None:
     refused = RecordingProblem("r1", "preload_n", -1.0, "must be greater than 0")
     nameless = RecordingProblem("recordings[3]", "id", None, "required")
     tuesday = replace(reading(press("own", level=7.3)), problems=[refused, nameless])
@@ -126,8 +124,7 @@ def test_copies_of_a_recording_count_once() -> None:
     )
 
 
-def test_recording_copy_numbers_sensor_contact() -> None:
-    """A recording is a copy by its numbers its sensor and its contact."""
+def test_a_recording_is_a_copy_by_its_numbers_its_sensor_and_its_contact() -> None:
     noisy = np.random.default_rng(2).normal(7, 0.1, 20)
     first = replace(
         press("a"), frequency_hz=np.arange(1.0, 21), frf_re_pc_per_n=noisy, frf_im_pc_per_n=0.01 * noisy,
@@ -143,8 +140,7 @@ def test_recording_copy_numbers_sensor_contact() -> None:
         assert ids(join("both", [("a.csv", reading(first)), ("b.csv", reading(other))])) == kept, changes
 
 
-def test_few_numbers_agree_chance_time() -> None:
-    """Few numbers may agree by chance at another time."""
+def test_few_numbers_may_agree_by_chance_at_another_time() -> None:
     first, again, later = (
         reading(replace(press(name), recorded_at=f"2017-05-{day}T09:00:00Z"))
         for name, day in (("a", "03"), ("b", "03"), ("c", "04"))
@@ -152,8 +148,7 @@ def test_few_numbers_agree_chance_time() -> None:
     assert ids(join("all", [("a.csv", first), ("b.csv", again), ("c.csv", later)])) == ["a", "c"]
 
 
-def test_few_numbers_without_time_no_copies() -> None:
-    """Few numbers without a time are no copies."""
+def test_few_numbers_without_a_time_are_no_copies() -> None:
     found = join("all", [(f"{name}.csv", reading(press(name))) for name in "abc"])
     assert (ids(found), found.warnings) == (["a", "b", "c"], [])
 
@@ -173,3 +168,26 @@ def test_wells_of_two_runs_of_a_real_instrument() -> None:
     assert len(set(wells)) == len(files) / 2
     assert not found.problems
     assert not any("very numbers" in warning for warning in found.warnings)
+
+
+def test_single_sensors_without_places() -> None:
+    """A campaign of one sensor needs no place of it; such files together are of sensors far from each other, each
+    pressed where its own file says."""
+    files = []
+    for sensor, offset in (("s1", None), ("s2", 0.5)):
+        one = to_dict(reading(press("r", sensor)).campaign)
+        del one["skin"]["sensors"]
+        one["recordings"][0] |= {} if offset is None else {"position_mm": [offset, 0.0]}
+        files.append((f"{sensor}.json", Reading(parse(one), [], [])))
+    found = join("palm", files)
+    places = {sensor.id: sensor.x_mm for sensor in found.campaign.skin.sensors}
+    assert places["s2"] - places["s1"] > 10 * 2.5
+    assert [one.position_mm for one in found.campaign.of(FrfRecording)] == [None, (places["s2"] + 0.5, 0.0)]
+    assert "s1 and s2 lies at x 0 mm, y 0 mm in its file" in found.warnings[0]
+
+
+def test_places_of_several_sensors_are_needed() -> None:
+    document = to_dict(reading(press("a", "s1"), press("b", "s2")).campaign)
+    document["skin"]["sensors"] = [{"id": "s1", "x_mm": 0.0, "y_mm": 0.0}, {"id": "s2"}]
+    with pytest.raises(InvalidInput, match=r"skin.sensors\[1\].x_mm.*required, but of a skin's only sensor"):
+        parse(document)

@@ -58,8 +58,7 @@ def test_every_number_of_a_long_template_arrives(end: str, *, every_id: bool) ->
     assert np.array_equal(values_of(recordings), VALUES[:2])
 
 
-def test_stands_rows_long_template_changes() -> None:
-    """What stands between the rows of a long template changes nothing."""
+def test_what_stands_between_the_rows_of_a_long_template_changes_nothing() -> None:
     lines = template(300)
     start = len((ABOVE + HEADINGS).splitlines())
     lines[start + 400] = lines[start + 400].replace(",,,,,", ' , ,"", , ,')
@@ -78,8 +77,7 @@ def test_stands_rows_long_template_changes() -> None:
         ((",,,,,", ',"s02,,,,'), "a cell in quotes must end on its line"),
     ],
 )
-def test_wrong_long_template_named_line(change: tuple[str, str], reason: str) -> None:
-    """What is wrong in a long template is named by its line."""
+def test_what_is_wrong_in_a_long_template_is_named_by_its_line(change: tuple[str, str], reason: str) -> None:
     lines = template(300)
     lines[717] = re.sub(*change, lines[717], count=1)
     with pytest.raises(FileError, match=re.escape(reason)) as refused:
@@ -88,8 +86,7 @@ def test_wrong_long_template_named_line(change: tuple[str, str], reason: str) ->
 
 
 @pytest.mark.parametrize("per_recording", [2, 300])
-def test_number_none_refused_recording_line(per_recording: int) -> None:
-    """A number that is none is refused by its recording or its line."""
+def test_a_number_that_is_none_is_refused_by_its_recording_or_its_line(per_recording: int) -> None:
     lines = template(per_recording)
     start = len((ABOVE + HEADINGS).splitlines())
     lines[start] = lines[start].replace("1.5", "nan")
@@ -101,8 +98,7 @@ def test_number_none_refused_recording_line(per_recording: int) -> None:
         read([*lines[: start + 1], other, *lines[start + 2 :]])
 
 
-def test_empty_cell_long_template_refused() -> None:
-    """An empty cell in a long template is refused with its recording."""
+def test_an_empty_cell_in_a_long_template_is_refused_with_its_recording() -> None:
     lines = template(300)
     lines[717] = lines[717].rpartition(",")[0] + ","
     problems = read_file("\n".join(lines).encode(), "a.csv").problems
@@ -125,8 +121,7 @@ def test_every_number_of_a_long_table_arrives(separator: str, decimal: str, enco
     assert np.array_equal([channel.values for channel in block.channels], VALUES)
 
 
-def test_text_far_down_long_table_named_line() -> None:
-    """Text far down in a long table is named by its line."""
+def test_text_far_down_in_a_long_table_is_named_by_its_line() -> None:
     lines = table(",", ".")
     lines[750] = "0.1,broken,0.3"
     with pytest.raises(FileError, match=r"found '0\.1,broken,0\.3'") as refused:

@@ -24,8 +24,7 @@ def test_a_list_in_place_of_a_schema_is_refused() -> None:
         from_dict(document)
 
 
-def test_list_place_kind_refuses_recording() -> None:
-    """A list in place of a kind refuses its recording."""
+def test_a_list_in_place_of_a_kind_refuses_its_recording() -> None:
     sent = campaign("array")
     first, second, *_ = sent["recordings"]
     document = read(json.dumps({**sent, "recordings": [{**first, "kind": NUMBERS}, second]}))["document"]

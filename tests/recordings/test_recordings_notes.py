@@ -6,8 +6,7 @@ from tests.recordings.test_recordings_cells import PLAIN, ROWS, read
 from tests.recordings.test_recordings_spreadsheets import same_as_plain
 
 
-def test_note_under_table_left_out_told() -> None:
-    """A note under the table is left out and told."""
+def test_a_note_under_the_table_is_left_out_and_told() -> None:
     reading = same_as_plain(PLAIN + "\nmeasured by mb\n")
     assert reading.warnings == ["line 13 under the table, 'measured by mb', is left out"]
 
@@ -21,14 +20,12 @@ def test_note_under_table_left_out_told() -> None:
         "by mb, in the cold room, air at 23 °C",
     ],
 )
-def test_words_separators_under_table_note(note: str) -> None:
-    """Words with separators under the table are a note."""
+def test_words_with_separators_under_the_table_are_a_note(note: str) -> None:
     (warning,) = same_as_plain(f"{PLAIN}{note}\n").warnings
     assert warning == f"line {12 + note.count(chr(10))} under the table, {note.strip()!r}, is left out"
 
 
-def test_words_recordings_not_taken_note() -> None:
-    """Words between recordings are not taken for a note."""
+def test_words_between_recordings_are_not_taken_for_a_note() -> None:
     reading = read(PLAIN + "\nin the cold room, air off\n" + ROWS.replace("r1", "r2"))
     assert {problem.recording for problem in reading.problems} == {"in the cold room"}
     cut = read(PLAIN + "r2,s01,four\n")

@@ -22,8 +22,7 @@ def of_each_folder(count: int, files: list[Path]) -> list[Path]:
     return [file for folder in folders for file in first(count, (one for one in files if one.parent == folder))]
 
 
-def test_sphere_well_comes_out_positive() -> None:
-    """Sphere in well comes out positive in compression."""
+def test_sphere_in_well_comes_out_positive_in_compression() -> None:
     wells = real("sphere-in-well/run_*/well_*.csv")
     for file in of_each_folder(1, wells):
         (recording,) = read(file, "sphere-in-well").campaign.recordings
@@ -37,8 +36,7 @@ def test_sphere_well_comes_out_positive() -> None:
     assert recording.force_n.max() == 10.003  # the run stops at 10 N
 
 
-def test_rig_not_know_hidden_sign_refused() -> None:
-    """A rig that does not know the hidden sign is refused."""
+def test_a_rig_that_does_not_know_the_hidden_sign_is_refused() -> None:
     (file,) = real("sphere-in-well/run_732*/well_E5_*.csv")
     channels = {
         "displacement_mm": {"channel": "Z_Position(mm)", "sign": -1},
@@ -64,8 +62,8 @@ def test_silicone_compression() -> None:
         assert low - 0.05 < slope_kpa < high + 0.05  # as the data's source states them, rounded
 
 
-def test_nanoindenters_depth_piezo_less() -> None:
-    """The nanoindenters depth is the piezo less the cantilever."""
+@pytest.mark.slow
+def test_the_nanoindenters_depth_is_the_piezo_less_the_cantilever() -> None:
     (file,) = real("afm-hold/fmt-chiaro*.txt")
     (recording,) = read(file, "fibre-top-indenter").campaign.recordings
     assert isinstance(recording, IndentationRecording)
@@ -79,8 +77,7 @@ def test_nanoindenters_depth_piezo_less() -> None:
     assert recording.force_n.max() == pytest.approx(49e-9, rel=0.01)
 
 
-def test_tip_radius_not_known_asked() -> None:
-    """A tip radius that is not known is asked for."""
+def test_a_tip_radius_that_is_not_known_is_asked_for() -> None:
     (file,) = real("afm-hold/polymergel_creep.csv")
     reading = read_file(file, file.name, example_rig("afm-cantilever"))
     assert [(problem.field, problem.allowed) for problem in reading.problems] == [("indenter_radius_mm", "required")]
@@ -91,15 +88,13 @@ def test_tip_radius_not_known_asked() -> None:
     assert np.ptp(recording.displacement_mm[hold]) > 1e-4  # creeps by more than 0.1 um at constant force
 
 
-def test_afm_files_refused() -> None:
-    """Other afm files are refused by what they are."""
+def test_other_afm_files_are_refused_by_what_they_are() -> None:
     for file in first(1, real("afm-hold/*.jpk-force")):
         with pytest.raises(FileError, match=r"is a JPK force file: .* export the curves as text"):
             read_file(file, file.name, example_rig("afm-cantilever"))
 
 
-def test_hammers_wrong_label_not_accepted() -> None:
-    """The hammers wrong label is not accepted silently."""
+def test_the_hammers_wrong_label_is_not_accepted_silently() -> None:
     (file,) = real("impact-hammer-lvm/*.lvm")
     reading = read(file, "impact-hammer")
     assert reading.warnings == ["channel 'F' is labelled 'g'; the rig description says 'N'"]
@@ -125,6 +120,7 @@ def test_hammers_wrong_label_not_accepted() -> None:
             read_file(file, file.name, rig_description.from_dict({**document, "channels": channels}))
 
 
+@pytest.mark.slow
 def test_the_same_sound_as_text_and_as_binary() -> None:
     (text,), (binary,) = real("uff-files/Sample_UFF58_ascii.uff"), real("uff-files/Sample_UFF58b_bin.uff")
     sounds = []

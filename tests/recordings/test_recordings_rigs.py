@@ -55,8 +55,7 @@ def test_units_and_sensitivities_are_applied() -> None:
     assert recording.id == "a"
 
 
-def test_time_file_states_lab_s_zone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A time that the file states is in the lab s zone."""
+def test_a_time_that_the_file_states_is_in_the_labs_zone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Rome")
     rig_of_file = parsed(SMALL.replace("2017-05-03T09:00:00Z", "{property: Date}"))
     for written in ("03.05.2026 14:30", "2026-05-03 14:30", "2026-05-03T12:30Z"):
@@ -72,8 +71,7 @@ def test_the_instruments_own_give_is_subtracted() -> None:
     assert recording.stage_stiffness_n_per_mm == 5  # contact that sticks comes off by it
 
 
-def test_force_falls_depth_needs_sign_said() -> None:
-    """A force that falls with depth needs its sign said."""
+def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
     with pytest.raises(FileError, match=r"a\.csv: channels: force falls .* say sign: 1, -1 or auto"):
         indented("-2.5")
     turned = SMALL.replace("channel: load,", "channel: load, sign: -1,").replace(
@@ -86,7 +84,7 @@ def test_force_falls_depth_needs_sign_said() -> None:
     ("part", "changes", "message"),
     [
         ((), {"schema": "rig/2"}, "schema = 'rig/2': must be rig/1"),
-        ((), {"kind": "tension"}, "kind = 'tension': must be one of frf, indentation, compression"),
+        ((), {"kind": "torsion"}, "kind = 'torsion': must be one of frf, indentation, compression, tension"),
         ((), {"rig": 3}, "rig = 3: unknown field"),
         (("skin",), {"colour": 0.5}, r"skin\.colour = 0\.5: must be one of"),
         (("recording",), {"preload_n": 2.5}, r"recording\.preload_n = 2\.5: must be one of"),
@@ -110,8 +108,7 @@ def test_wrong_rig_description_refused_field(part: tuple[str, ...], changes: dic
         rig_description.from_dict(described)
 
 
-def test_wrong_told_once_nothing_hangs() -> None:
-    """All that is wrong is told at once and nothing that hangs on it."""
+def test_all_that_is_wrong_is_told_at_once_and_nothing_that_hangs_on_it() -> None:
     wrong = SMALL.replace("unit: um", "stiffness_n_per_mm: -1, sign: 3").replace("1e-2", "abc")
     wrong = wrong.replace("kind:", "trim: {first_sample: 0}\nderived: {depth: 2 *, load: )}\nestimator: H1\nkind:")
     with pytest.raises(SeveralInvalid) as raised:
@@ -183,8 +180,7 @@ def test_a_channel_that_does_not_fit_is_refused(channel: dict[str, Any], message
         read_file(b"force [mN];amplifier\n1000;0\n1100;-0.007\n900;0.007", "run.csv", rig(channels=channels))
 
 
-def test_property_file_not_state_refused() -> None:
-    """A property that the file does not state is refused."""
+def test_a_property_that_the_file_does_not_state_is_refused() -> None:
     with pytest.raises(
         FileError, match=r"property 'rate': is not in the file, which states block, operator, run\.preload, preload"
     ):
@@ -200,8 +196,7 @@ def test_the_example_rig_descriptions_are_valid(file: Path) -> None:
     assert example_rig(file.stem).channels
 
 
-def test_channel_named_without_unit_brackets() -> None:
-    """A channel may be named without the unit in brackets behind it."""
+def test_a_channel_may_be_named_without_the_unit_in_brackets_behind_it() -> None:
     described, rows = parsed(SMALL), "0;0\n100;2.5\n200;2.5"
     (recording,) = read_file(f"depth [um];load (V)\n{rows}".encode(), "a.csv", described).campaign.recordings
     assert isinstance(recording, IndentationRecording)

@@ -66,8 +66,7 @@ def test_what_the_child_reads_arrives_unchanged(kind: str) -> None:
             assert np.array_equal(mine.values, theirs.values)
 
 
-def test_small_file_unfolds_beyond_memory_limit() -> None:
-    """A small file that unfolds beyond the memory limit is refused."""
+def test_a_small_file_that_unfolds_beyond_the_memory_limit_is_refused() -> None:
     data = matlab_73(lambda target: target.create_dataset("force", data=np.zeros(20_000_000), compression="gzip"))
     assert len(data) < 1_000_000
     with tempfile.TemporaryFile() as stream:
@@ -79,17 +78,14 @@ def test_small_file_unfolds_beyond_memory_limit() -> None:
             parse_apart("MATLAB", stream, "bomb.mat", ParsingLimits(memory_bytes=107_374_182))
 
 
-def test_small_file_cannot_become_large_campaign() -> None:
-    """A small file cannot become a large campaign."""
+def test_a_small_file_cannot_become_a_large_campaign() -> None:
     data = matlab_73(lambda target: target.create_dataset("force", data=np.zeros(3_000_000), compression="gzip"))
     with pytest.raises(FileError, match=r"bomb\.mat: it unfolds to more than \d+ MB, too much for a file of its size"):
         read_contents(data, "bomb.mat")
 
 
 @pytest.mark.usefixtures("understood_here")
-def test_dataset_never_written_refused() -> None:
-    """A dataset that was never written is refused."""
-
+def test_a_dataset_that_was_never_written_is_refused() -> None:
     def declare(target: Any) -> None:
         del target["recordings/000000/force_n"]
         target.create_dataset("recordings/000000/force_n", (1_000_000,), "f8", fillvalue=1.0)
@@ -129,8 +125,7 @@ def wait(_stream: BinaryIO) -> dict[str, Any]:
     return {}
 
 
-def test_time_processor_counts_waiting(stream: BinaryIO) -> None:
-    """Time on a processor counts and waiting for one does not."""
+def test_time_on_a_processor_counts_and_waiting_for_one_does_not(stream: BinaryIO) -> None:
     assert call_apart(f"{__name__}:wait", stream, "a", what="TDMS", limits=ParsingLimits(seconds=4.0)) == {}
     with pytest.raises(FileError, match=r"a: reading it as TDMS took more than 1 s and was stopped"):
         call_apart(f"{__name__}:compute", stream, "a", what="TDMS", limits=ParsingLimits(seconds=1.0))
@@ -157,15 +152,13 @@ def see_environment(_stream: BinaryIO) -> dict[str, str]:
     ("function", "message"),
     [("die", "was killed by signal 11"), ("fail", "ended with status 1: RuntimeError: something unforeseen")],
 )
-def test_childs_death_error_names_file(stream: BinaryIO, function: str, message: str) -> None:
-    """The childs death is an error that names the file."""
+def test_the_childs_death_is_an_error_that_names_the_file(stream: BinaryIO, function: str, message: str) -> None:
     with pytest.raises(FileError, match=message) as refusal:
         call_apart(f"{__name__}:{function}", stream, "palm.tdms", what="TDMS")
     assert refusal.value.file == "palm.tdms"
 
 
-def test_child_cannot_answer_hold(stream: BinaryIO) -> None:
-    """The child cannot answer more than it may hold."""
+def test_the_child_cannot_answer_more_than_it_may_hold(stream: BinaryIO) -> None:
     with pytest.raises(FileError, match=r"a: it unfolds to more than 16 MB"):
         call_apart(f"{__name__}:write_much", stream, "a", what="TDMS")
 
@@ -212,8 +205,7 @@ def same_twice(target: Any, _secret: Path) -> None:
         *(("MATLAB", fill) for fill in first(2, (link_outside, map_outside, store_outside, link_inside, lead_back))),
     ],
 )
-def test_hdf5_leads_out_file_refused(kind: str, fill: Any, tmp_path: Path) -> None:
-    """Hdf5 that leads out of the file is refused."""
+def test_hdf5_that_leads_out_of_the_file_is_refused(kind: str, fill: Any, tmp_path: Path) -> None:
     with h5py.File(tmp_path / "secret.h5", "w") as secret:
         secret["data"] = np.arange(4.0)
     if kind == "MATLAB":
@@ -228,8 +220,7 @@ def test_hdf5_leads_out_file_refused(kind: str, fill: Any, tmp_path: Path) -> No
 
 
 @pytest.mark.usefixtures("understood_here")
-def test_name_given_client_never_becomes_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A name given by a client never becomes a path."""
+def test_a_name_given_by_a_client_never_becomes_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("../../escape.h5", str(tmp_path / "absolute.h5"), "\0", "x" * 5000, "-rf"):
         assert read_file(hdf5(EVERYTHING), name).campaign.recordings

@@ -70,8 +70,7 @@ def test_columns_of_words_are_left_out_and_told() -> None:
     assert "conditions.NAME" in warning
 
 
-def test_numbers_without_field_refused_misspelt() -> None:
-    """Numbers without a field are refused and a misspelt heading is guessed."""
+def test_numbers_without_a_field_are_refused_and_a_misspelt_heading_is_guessed() -> None:
     unknown = refusal(ABOVE + HEADINGS.replace("\n", ",humidity\n") + ROWS.replace("-0.5\n", "-0.5,40\n"))
     assert (unknown.place, "conditions.NAME" in unknown.reason) == ("line 9, column 9", True)
     assert "did you mean preload_n?" in refusal(changed("preload_n", "prelaod_n")).reason
@@ -94,8 +93,7 @@ def test_numbers_without_field_refused_misspelt() -> None:
         "peak_to_peak force [N]",
     ],
 )
-def test_force_no_amplitude_not_taken(heading: str) -> None:
-    """A force that is no amplitude is not taken for one."""
+def test_a_force_that_is_no_amplitude_is_not_taken_for_one(heading: str) -> None:
     reason = refusal(changed("dynamic_force_n", heading)).reason
     assert "dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms" in reason
     assert "did you mean" not in reason
@@ -121,8 +119,7 @@ def test_a_diameter_is_halved_and_that_is_told() -> None:
         ("Phase (rad)", 1.0),
     ],
 )
-def test_magnitude_phase_stand_real_imaginary(heading: str, turn: float) -> None:
-    """Magnitude and phase stand for real and imaginary part."""
+def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, turn: float) -> None:
     head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", f"frf_magnitude_pc_per_n,{heading}")
     polar = [cmath.polar(value) for value in (7.1 - 0.5j, 7.2 - 0.6j)]
     rows = [f"{magnitude!r},{phase * turn!r}" for magnitude, phase in polar]
@@ -135,8 +132,7 @@ def test_magnitude_phase_stand_real_imaginary(heading: str, turn: float) -> None
     assert "is given with real and imaginary parts" in beside.reason
 
 
-def test_phase_without_unit_degrees_values_say() -> None:
-    """A phase without a unit is in degrees where its values say so and else asked for."""
+def test_a_phase_without_a_unit_is_in_degrees_where_its_values_say_so_and_else_asked_for() -> None:
     head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "frf_magnitude_pc_per_n,FRF_Phase")
 
     def written(turn: float, first: complex, second: complex) -> str:
@@ -160,15 +156,13 @@ def test_phase_without_unit_degrees_values_say() -> None:
         (",1.0,0.09", ",heavy,0.09", "preload_n", "line 10, column 4"),
     ],
 )
-def test_cell_no_number_told_line(old: str, new: str, field: str, place: str) -> None:
-    """A cell that is no number is told with its line."""
+def test_a_cell_that_is_no_number_is_told_with_its_line(old: str, new: str, field: str, place: str) -> None:
     (problem,) = read(changed(old, new)).problems
     assert (problem.recording, problem.field) == ("r1", field)
     assert problem.allowed == f"must be a number ({place})"
 
 
-def test_number_above_table_none_told_line() -> None:
-    """A number above the table that is none is told with its line."""
+def test_a_number_above_the_table_that_is_none_is_told_with_its_line() -> None:
     with pytest.raises(InvalidInput, match=r"skin.thickness_mm = 'thin': must be a number \(line 3, column 2\)"):
         read(changed("skin.thickness_mm,2.5", "skin.thickness_mm,thin"))
 
@@ -182,8 +176,7 @@ def test_number_above_table_none_told_line() -> None:
         ("12/24/2025", "2025-12-24T00:00:00"),
     ],
 )
-def test_local_times_read_zone_told(written: str, time: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Local times are read and their zone told."""
+def test_local_times_are_read_and_their_zone_told(written: str, time: str, monkeypatch: pytest.MonkeyPatch) -> None:
     text = ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n")
     for zone, offset in (("UTC", "+00:00"), ("Europe/Berlin", "+01:00")):
         monkeypatch.setenv("UNDERSKIN_TIME_ZONE", zone)
@@ -197,9 +190,7 @@ def test_local_times_read_zone_told(written: str, time: str, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("day", ["24.12.2025", "2025-12-24", "2025-12-24T00:00:00+01:00"])
-def test_date_time_day_columns_time(day: str) -> None:
-    """A date and a time of day in columns of their own are one time."""
-
+def test_a_date_and_a_time_of_day_in_columns_of_their_own_are_one_time(day: str) -> None:
     def table(headings: str, cells: str) -> str:
         return ABOVE + HEADINGS.replace("\n", headings + "\n") + ROWS.replace("-0.5\n", f"-0.5,{cells}\n", 1)
 
@@ -232,15 +223,13 @@ def test_time_two_none_left_out(written: str, reason: str) -> None:
     assert note.startswith(f"line 10, column 9: recorded_at = {written!r} {reason}")
 
 
-def test_forces_grams_pounds_converted() -> None:
-    """Forces in grams and pounds are converted."""
+def test_forces_in_grams_and_pounds_are_converted() -> None:
     for unit, newtons in (("gf", 9.80665e-3), ("kgf", 9.80665), ("lbf", 4.4482216152605)):
         text = changed("preload_n", f"Preload [{unit}]").replace(",1.0,0.09", f",{1.0 / newtons},0.09")
         assert only(same_as_plain(text)).preload_n == pytest.approx(1.0)
 
 
-def test_cut_file_ends_not_taken_note() -> None:
-    """What a cut file ends with is not taken for a note."""
+def test_what_a_cut_file_ends_with_is_not_taken_for_a_note() -> None:
     cut = read(PLAIN + ",,,,,30\n")
     assert [(problem.recording, problem.value) for problem in cut.problems] == [("r1", None)] * 2
     begun = read(PLAIN + "r2\n")

@@ -85,8 +85,7 @@ def test_a_byte_order_mark_is_no_part_of_a_name(encoding: str) -> None:
 
 @pytest.mark.parametrize("cells", [("mb", "mb"), ("begin", ""), ("12:00:01", "12:00:02")])
 @pytest.mark.parametrize("place", ["first", "last"])
-def test_columns_text_left_out_warning(cells: tuple[str, str], place: str) -> None:
-    """Columns of text are left out with a warning."""
+def test_columns_of_text_are_left_out_with_a_warning(cells: tuple[str, str], place: str) -> None:
     said = [cells[0], *[cells[1]] * (len(DEPTH) - 1)]
     names = "Depth (um);Force (mN)"
     lines = [f"Note;{names}" if place == "first" else f"{names};Note"]
@@ -109,8 +108,7 @@ def test_columns_text_left_out_warning(cells: tuple[str, str], place: str) -> No
     assert f"column 'Note' holds text, such as {cells[0]!r}, and is left out" in warnings
 
 
-def test_text_among_columns_numbers_refused_line() -> None:
-    """Text among a columns numbers is refused by line."""
+def test_text_among_a_columns_numbers_is_refused_by_line() -> None:
     lines = ["Time;Depth (um);Force (mN)", *(f"{number};{row}" for number, row in enumerate(rows(";")))]
     for place in (5, 12):
         wrong = [*lines[:place], "x" + lines[place], *lines[place + 1 :]]
@@ -118,8 +116,7 @@ def test_text_among_columns_numbers_refused_line() -> None:
             read_contents("\n".join(wrong).encode(), "curve.txt")
 
 
-def test_comments_part_rows_state_properties() -> None:
-    """Comments may part the rows and state properties."""
+def test_comments_may_part_the_rows_and_state_properties() -> None:
     there, back = slice(9), slice(9, None)
     lines = ["# springConstant: 0.05", "# k (N/m) = 3", "# segment: extend", "# columns: Depth Force", "# units: um mN"]
     text = [*lines, *rows(" ", part=there), "", "# segment: retract", *lines[3:], *rows(" ", part=back)]
@@ -141,8 +138,7 @@ def test_comments_part_rows_state_properties() -> None:
         ("Spring constant{separator}3{decimal}5{separator}N/m", "Spring constant (N/m)"),
     ],
 )
-def test_spring_constant_above_numbers_property(line: str, name: str, separator: str, decimal: str) -> None:
-    """A spring constant above the numbers is a property."""
+def test_a_spring_constant_above_the_numbers_is_a_property(line: str, name: str, separator: str, decimal: str) -> None:
     if separator == " " and "{separator}" in line:
         line = line.replace("{separator}", ": ", 1).replace("{separator}", " ")
     stated = line.format(separator=separator, decimal=decimal)
@@ -152,8 +148,7 @@ def test_spring_constant_above_numbers_property(line: str, name: str, separator:
     assert spring_constant(Property(name), found.properties, "curve.txt") == 3.5
 
 
-def test_curves_under_headings_parts() -> None:
-    """Curves under headings of their own are parts."""
+def test_curves_under_headings_of_their_own_are_parts() -> None:
     text = [line for name in ("a", "b") for line in (f"Curve;{name}", "Depth (um);Force (mN)", *rows(";"), "")]
     found = contents("\n".join(text).encode(), "curves.txt")
     assert [block.name for block in found.blocks] == ["1", "2"]

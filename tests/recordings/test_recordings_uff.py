@@ -45,8 +45,7 @@ SEVERAL = {"frequency_hz": {"channel": "frequency"}, "frf_pc_per_n": {"channel":
 
 
 @leaky_writer
-def test_several_frfs_uff58_recording() -> None:
-    """Of several frfs in uff58 each is a recording."""
+def test_of_several_frfs_in_uff58_each_is_a_recording() -> None:
     recording = {**COMMON, "sensor": {"property": "block"}}
     places = {"s1": 0.0, "s2": 8.0, "s3": 16.0}
     skin = {**SKIN, "sensors": [{"id": name, "x_mm": x, "y_mm": 0.0} for name, x in places.items()]}
@@ -63,8 +62,7 @@ def test_several_frfs_uff58_recording() -> None:
 
 
 @leaky_writer
-def test_frfs_name_units_told_apart() -> None:
-    """Frfs of one name or of other units are told apart."""
+def test_frfs_of_one_name_or_of_other_units_are_told_apart() -> None:
     responses = {"H1": "1", "H1 (dataset 2)": "2"}
     found = contents(uff(0, frf_datasets(["H1", "H1"])), "run.uff")
     assert {block.name: found.properties[f"{block.name}.response"] for block in found.blocks} == responses
@@ -78,8 +76,7 @@ def test_frfs_name_units_told_apart() -> None:
     assert "1 parts without the rig's channels are left out" in reading.warnings
 
 
-def test_universal_file_cut_off_said() -> None:
-    """A universal file that is cut off is said."""
+def test_a_universal_file_that_is_cut_off_is_said() -> None:
     whole = uff(0, time_datasets())
     assert "no end" in contents(whole[:-30], "run.uff").warnings[0]
     lines = whole.decode().splitlines()
@@ -90,8 +87,7 @@ def test_universal_file_cut_off_said() -> None:
 
 @leaky_writer
 @pytest.mark.parametrize("turned", [False, True])
-def test_frfs_degree_freedom_two_axes_coherence(turned: bool) -> None:
-    """Frfs of one degree of freedom on two axes have each its coherence."""
+def test_frfs_of_one_degree_of_freedom_on_two_axes_have_each_its_coherence(turned: bool) -> None:
     frf, coherence = ({**one, "abscissa_spacing": 0, "abscissa_inc": 0.0} for one in frf_datasets(["sweep"]))
     zoomed = {"x": np.array([20.0, 21.0, 23.0])}
     zoom_frf = {**frf, **zoomed, "id1": "zoom"}

@@ -82,22 +82,19 @@ def refusal(data: bytes) -> FileError:
     return refused.value
 
 
-def test_campaign_workbook_csv() -> None:
-    """A campaign in a workbook is that of the csv."""
+def test_a_campaign_in_a_workbook_is_that_of_the_csv() -> None:
     reading = read_file(workbook({"May": cells(PLAIN), "Notes": [["by mb"]]}), "palm.xlsx")
     assert reading.problems == []
     assert to_dict(reading.campaign) == to_dict(read(PLAIN).campaign)
     assert reading.warnings == ["sheet 'Notes' is no campaign, and is left out"]
 
 
-def test_wrong_sheet_named_csv() -> None:
-    """What is wrong on a sheet is named as in the csv."""
+def test_what_is_wrong_on_a_sheet_is_named_as_in_the_csv() -> None:
     error = refusal(workbook({"May": cells(changed("preload_n", "prelaod_n"))}))
     assert (error.place, "did you mean preload_n?" in error.reason) == ("sheet 'May', line 9, column 4", True)
 
 
-def test_skin_sheet_table_next_campaign() -> None:
-    """The skin on one sheet and the table on the next are one campaign."""
+def test_the_skin_on_one_sheet_and_the_table_on_the_next_are_one_campaign() -> None:
     table = cells(HEADINGS + ROWS)
     data = workbook({"Skin": cells(ABOVE), "Notes": [["warm day"]], "May": table})
     reading = read_file(data, "palm.xlsx")
@@ -109,8 +106,7 @@ def test_skin_sheet_table_next_campaign() -> None:
     assert "the table is missing" in error.reason
 
 
-def test_formulas_count_value_kept() -> None:
-    """Formulas count by the value that was kept."""
+def test_formulas_count_by_the_value_that_was_kept() -> None:
     rows = cells(changed("skin.thickness_mm,2.5", "skin.thickness_mm,=5/2"))
     plain = workbook({"May": rows})
     error = refusal(plain)
@@ -121,8 +117,7 @@ def test_formulas_count_value_kept() -> None:
     assert reading.campaign.skin.thickness_mm == 2.25
 
 
-def test_date_cell_zone_lab(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A date in a cell is in the zone of the lab."""
+def test_a_date_in_a_cell_is_in_the_zone_of_the_lab(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Rome")
     rows = cells(ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS)
     first = next(row for row in rows if row and row[0] == "r1")
@@ -137,8 +132,7 @@ def series(preload: float) -> Sheet:
     return [["Preload [N]", preload], ["Force\n[N]", "Charge [pC]"], *map(list, numbers)]
 
 
-def test_sheet_table_recording_name() -> None:
-    """Each sheet with a table is a recording by its name."""
+def test_each_sheet_with_a_table_is_a_recording_by_its_name() -> None:
     data = workbook({"s01": series(1.0), "about": [["Operator", "mb"]], "s02": series(2.5)})
     rig = rig_description.from_dict(
         {
@@ -172,8 +166,7 @@ def test_sheet_table_recording_name() -> None:
 BOMB = b"<a>" + b" " * 30_000_000
 
 
-def test_workbook_unfolds_too_far_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A workbook that unfolds too far is refused before it is understood."""
+def test_a_workbook_that_unfolds_too_far_is_refused_before_it_is_understood(monkeypatch: pytest.MonkeyPatch) -> None:
     data = with_parts(workbook({"May": cells(PLAIN)}), lambda _, part: part, **{"xl/media/image1.xml": BOMB})
     assert len(data) < 1_000_000
     error = refusal(data)
@@ -206,9 +199,7 @@ def parts() -> list[str]:
 
 
 @pytest.mark.parametrize("part", first(3, parts()))
-def test_xml_cut_sound_archive_refused(part: str) -> None:
-    """Xml that is cut in a sound archive is refused."""
-
+def test_xml_that_is_cut_in_a_sound_archive_is_refused(part: str) -> None:
     def half(name: str, content: bytes) -> bytes:
         return content[: len(content) // 2] if name == part else content
 

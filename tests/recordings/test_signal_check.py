@@ -11,8 +11,7 @@ from underskin.recordings.frf.spectra import Frf, defects, defects_of_pair
 from underskin.units import Floats
 
 
-def test_overload_seen_nowhere_else() -> None:
-    """Overload is seen where it is and nowhere else."""
+def test_overload_is_seen_where_it_is_and_nowhere_else() -> None:
     _, charge = shaken(7)
     ceiling = np.quantile(charge, 0.98)
     found = defects("charge_pc", np.minimum(charge, ceiling))
@@ -94,18 +93,14 @@ def test_broadband_leaves_damaged_blocks_out() -> None:
     assert frf.averages[0] < whole.averages[0]
 
 
-def test_coarse_whole_sine_not_called_overloaded() -> None:
-    """A coarse but whole sine is not called overloaded or held."""
+def test_a_coarse_but_whole_sine_is_not_called_overloaded_or_held() -> None:
     for amplitude in (7.3, 20.0, 50.5, 203.2):
         sine = np.round(amplitude * np.sin(2 * np.pi * np.arange(20_000) * 3.1 / RATE))
         assert defects("force_n", sine) == []
 
 
-def test_periodic_sweep_begins_anew_nothing() -> None:
-    """Where a periodic sweep begins anew nothing is damaged.
-
-    It jumps there in force and charge, at one distance; so do samples lost at the end of each buffer, which are.
-    """
+def test_where_a_periodic_sweep_begins_anew_nothing_is_damaged() -> None:
+    """It jumps there in force and charge, at one distance; so do samples lost at the end of each buffer, which are."""
     time = np.arange(1000) / RATE
     period = 1.0 + np.cos(2 * np.pi * (1.0 + 40.0 * time) * time + 0.7)
     force = np.tile(period, 8) + 1e-4 * np.random.default_rng(3).normal(size=8000)
@@ -120,8 +115,7 @@ def test_periodic_sweep_begins_anew_nothing() -> None:
 
 
 @pytest.mark.parametrize("period", [300.4, 251.25])
-def test_period_need_not_whole_number_samples(period: float) -> None:
-    """A period need not be a whole number of samples."""
+def test_a_period_need_not_be_a_whole_number_of_samples(period: float) -> None:
     time = np.arange(8000) % period / RATE
     force = 1.0 + np.cos(2 * np.pi * (4.0 + 120.0 * time) * time + 0.7)
     force = force + 1e-4 * np.random.default_rng(3).normal(size=8000)
@@ -203,11 +197,12 @@ def _whole(kind: str, random: np.random.Generator, samples: int) -> Floats:
     return blows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sine", "sweep", "noise", "square", "blows"])
 def test_clipped_before_noise_was_added(kind: str) -> None:
     """A rail with noise behind it is overload in either channel; signals that dwell at their extremes are whole."""
     clipped_pairs = seen = 0
-    for seed in range(20 if SOAK else 12):
+    for seed in range(20 if SOAK else 6):
         random = np.random.default_rng(seed)
         force, gain = _whole(kind, random, 8192), 7.4
         noise = random.normal(0.0, 10 ** random.uniform(-3.0, -1.5), (2, len(force)))

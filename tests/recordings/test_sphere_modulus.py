@@ -45,8 +45,7 @@ def refusal(read: Campaign) -> str:
 
 
 @pytest.mark.parametrize("depth_mm", [0.1, 0.25])
-def test_declared_thickness_gives_layer_s_law(depth_mm: float) -> None:
-    """A declared thickness gives the layer s law."""
+def test_a_declared_thickness_gives_the_layers_law(depth_mm: float) -> None:
     depth = ways(-0.05, depth_mm, samples=400)
     force = pressed(depth, bonded_layer(2.0, 2.0))
     found = result(campaign(depth, force, skin={"thickness_mm": 2.0}))
@@ -100,11 +99,8 @@ def test_beyond_a_law_no_modulus_is_quoted() -> None:
     assert "of the declared thickness" in thin
 
 
-def test_adhesion_creep_stiffening_leave_sphere() -> None:
-    """Adhesion creep and stiffening leave a sphere a sphere.
-
-    What a sphere's force usually shows beside Hertz's law is no other tip.
-    """
+def test_adhesion_creep_and_stiffening_leave_a_sphere_a_sphere() -> None:
+    """What a sphere's force usually shows beside Hertz's law is no other tip."""
     depth = ways(-0.1, 0.3, samples=400)
     sticks = pressed(depth) - 0.05 * (depth > 0)
     stiffens = pressed(depth, lambda at: hertz(at) * (1 + 0.8 * np.sqrt(at / 0.3)))

@@ -64,11 +64,8 @@ def force_of(reading: Reading) -> Any:
         ("Pfund", "N"), ("mV rms", "N"), ("kn", "mN"),
     ],
 )  # fmt: skip
-def test_label_contradicts_rig_refused(label: str, stated: str) -> None:
-    """A label that contradicts the rig is refused.
-
-    In a heading, in a row of units and as an instrument's own label; both are named.
-    """
+def test_a_label_that_contradicts_the_rig_is_refused(label: str, stated: str) -> None:
+    """In a heading, in a row of units and as an instrument's own label; both are named."""
     label = label.removeprefix("дин. ")
     said = rf"is labelled '{label}', but the rig description says '{stated}'"
     force = {"channel": "Force", "unit": stated}
@@ -125,19 +122,36 @@ def test_words_and_abbreviations_are_units(label: str, newtons: float) -> None:
     ],
 )  # fmt: skip
 def test_synonyms_are_one_unit(one: str, other: str) -> None:
-    if other != "lbf/in2":
-        assert unit(other) is not None
-        assert meanings(one) == (unit(other),)
-    else:
-        assert unit(one) is not None
+    assert unit(other) is not None
+    assert meanings(one) == (unit(other),)
+
+
+@pytest.mark.parametrize(
+    ("label", "dimension", "size"),
+    [
+        ("fC", "charge", 1e-15), ("aC", "charge", 1e-18), ("femtocoulomb", "charge", 1e-15), ("fN", "force", 1e-15),
+        ("fA", "current", 1e-15), ("fC/N", "charge/force", 1e-15), ("aC/mN", "charge/force", 1e-15),
+        ("pC.N-1", "charge/force", 1e-12), ("cN", "force", 1e-2), ("daN", "force", 10.0), ("hPa", "pressure", 100.0),
+        ("kgf/cm2", "pressure", 98066.5), ("mN/mm²", "pressure", 1e3), ("lbf/in2", "pressure", 6894.757293),
+        ("dyn", "force", 1e-5), ("THz", "frequency", 1e12), ("rad/s", "frequency", 0.5 / np.pi),
+        ("rad·s^-1", "frequency", 0.5 / np.pi), ("krad/s", "frequency", 500 / np.pi), ("deg/s", "frequency", 1 / 360),
+        ("rev/min", "frequency", 1 / 60), ("cycles/s", "frequency", 1.0), ("cps", "frequency", 1.0),
+    ],
+)  # fmt: skip
+def test_conversions_to_si(label: str, dimension: str, size: float) -> None:
+    (meaning,) = meanings(label)
+    assert meaning.dimension == dimension
+    assert meaning.to_si == pytest.approx(size, rel=1e-9)
+
+
+@pytest.mark.parametrize("word", ["fs", "as", "am", "hs", "1/s"])
+def test_words_of_headings_are_no_rare_units(word: str) -> None:
+    assert meanings(word) == ()
 
 
 @pytest.mark.parametrize("heading", ["F_m", "Q_A", "F_s", "Force CH1, A", "Load cycles", "Force (g)"])
-def test_end_name_no_label_against_rig(heading: str) -> None:
-    """The end of a name is no label against the rig.
-
-    An axis, a channel or a statistic is named so; g is a gram-force as well.
-    """
+def test_the_end_of_a_name_is_no_label_against_the_rig(heading: str) -> None:
+    """An axis, a channel or a statistic is named so; g is a gram-force as well."""
     stated = "gf" if heading == "Force (g)" else "N"
     newtons = 9.80665e-3 if stated == "gf" else 1.0
     for data, name in ((table(heading), "a.csv"), (tdms(heading, ""), "a.tdms")):
@@ -146,8 +160,7 @@ def test_end_name_no_label_against_rig(heading: str) -> None:
 
 
 @pytest.mark.parametrize("heading", ["F_mN", "Force lbs", "Force mV", "Force / V", "Force (V)", "Force dB"])
-def test_end_name_unit_contradicts_rig(heading: str) -> None:
-    """The end of a name that is a unit contradicts the rig."""
+def test_the_end_of_a_name_that_is_a_unit_contradicts_the_rig(heading: str) -> None:
     with pytest.raises(FileError, match=r"is labelled '.*', but the rig description says 'N'"):
         read_file(tdms(heading, ""), "a.tdms", rig({"channel": heading, "unit": "N"}))
 
@@ -186,11 +199,8 @@ def test_decibels_are_refused() -> None:
 
 
 @pytest.mark.parametrize("formula", [True, False])
-def test_frf_volts_per_newton_becomes_charge(formula: bool) -> None:
-    """An frf in volts per newton becomes charge by the amplifier.
-
-    V/N over mV/pC is pC/N, by a sensitivity and by a formula.
-    """
+def test_an_frf_in_volts_per_newton_becomes_charge_by_the_amplifier(formula: bool) -> None:
+    """V/N over mV/pC is pC/N, by a sensitivity and by a formula."""
     rows = "\n".join(f"{5 * n};{0.074 + 1e-4 * n};0.001" for n in range(1, 9))
     amplifier = {} if formula else {"sensitivity": 10, "sensitivity_unit": "mV/pC"}
     parts = {name: {"channel": part.lower() if formula else part, **amplifier} for name, part in PARTS.items()}

@@ -13,6 +13,8 @@ from rig.layer import Floats
 from rig.relaxation import Relaxation
 from rig.sphere import sphere_law
 
+pytestmark = pytest.mark.slow
+
 R, E, DEPTH = 7.5e-3, 1.0, 1.5e-3  # mm, MPa, mm
 W, W_S = 40e-6, 75e-6  # N/mm
 PLANE = E / 0.75
@@ -66,11 +68,8 @@ def last_force(stage_n_per_mm: float) -> float:
 
 
 @pytest.mark.slow
-def test_pull_off_lies_limits_soft_stiff_stage() -> None:
-    """Pull off lies between the limits of a soft and a stiff stage.
-
-    −3/2 π w R under force control, −5/6 π w R under displacement control.
-    """
+def test_pull_off_lies_between_the_limits_of_a_soft_and_a_stiff_stage() -> None:
+    """−3/2 π w R under force control, −5/6 π w R under displacement control."""
     limits = [last_force(stage) for stage in (1e-4, 3e-3, np.inf)]
     assert limits[0] == pytest.approx(-1.5, abs=2e-3)
     assert limits[-1] == pytest.approx(-5 / 6, abs=6e-2)  # the force rises steeply there
@@ -118,11 +117,8 @@ def test_the_cycle_dissipates_the_hysteresis() -> None:
 
 
 @pytest.mark.parametrize("law", ["linear", "limited"])
-def test_sticks_stiffens_far_contact_wide(law: str) -> None:
-    """What sticks stiffens as far as its contact is wide.
-
-    Stiffening goes on beyond the strain that a contact without adhesion would reach at the largest depth.
-    """
+def test_what_sticks_stiffens_as_far_as_its_contact_is_wide(law: str) -> None:
+    """Stiffening goes on beyond the strain that a contact without adhesion would reach at the largest depth."""
     values: dict[str, float | str] = {"law": law, "coefficient": 4.0}
     stiff = sphere_law({"strain_stiffening": values}, R, 1.0, DEPTH)
     work = W
@@ -140,16 +136,14 @@ def test_sticks_stiffens_far_contact_wide(law: str) -> None:
     assert force[growing] == pytest.approx(expected, abs=2e-3 * force.max())
 
 
-def test_contact_sticks_up_law_locks_refused() -> None:
-    """A contact that sticks up to where its law locks is refused."""
+def test_a_contact_that_sticks_up_to_where_its_law_locks_is_refused() -> None:
     coefficient = 0.88 / (0.2 * np.sqrt(DEPTH / R))
     stiff = sphere_law({"strain_stiffening": {"law": "limited", "coefficient": coefficient}}, R, 1.0, DEPTH)
     with pytest.raises(RigError, match="wider"):
         there_and_back(Body(stiff, E, approach=W, separation=W), 0.0)
 
 
-def test_without_adhesion_contact_hertzian() -> None:
-    """Without adhesion the contact is hertzian and with little nearly so."""
+def test_without_adhesion_the_contact_is_hertzian_and_with_little_nearly_so() -> None:
     _, _, depth, force = there_and_back(replace(STICKY, approach=0.0, separation=0.0), 0.0)
     hertz = 4 / 3 * PLANE * np.sqrt(R) * np.maximum(depth, 0) ** 1.5
     assert force == pytest.approx(hertz, abs=1e-5 * hertz.max())
@@ -164,11 +158,8 @@ def modulus(elapsed: float) -> float:
     return 1 - sum(g * (1 - np.exp(-elapsed / tau)) for g, tau in zip(FRACTIONS, TIMES, strict=True))
 
 
-def test_two_prony_pairs_follow_lee_radok_ting() -> None:
-    """Two prony pairs follow lee and radok and ting.
-
-    Independent integrals: in until 4 s, hold until 5 s, back until 9 s; t1 from ∫ E(t − s) dδ = 0.
-    """
+def test_two_prony_pairs_follow_lee_and_radok_and_ting() -> None:
+    """Independent integrals: in until 4 s, hold until 5 s, back until 9 s; t1 from ∫ E(t − s) dδ = 0."""
     time = np.linspace(0, 9, 4001)
     travel = np.interp(time, [0, 4, 5, 9], [0, DEPTH, DEPTH, 0])
     _, force = contact_history(Body(LAW, E, Relaxation(FRACTIONS, TIMES)), time, travel, 0.0)
@@ -191,8 +182,7 @@ def test_two_prony_pairs_follow_lee_radok_ting() -> None:
     assert np.interp(8.5, time, force) == 0  # the surface has not recovered yet
 
 
-def test_hold_under_soft_stage_sphere_creeps() -> None:
-    """In a hold under a soft stage the sphere creeps in."""
+def test_in_a_hold_under_a_soft_stage_the_sphere_creeps_in() -> None:
     body = Body(LAW, E, Relaxation(FRACTIONS, TIMES))
     time, travel, depth, force = there_and_back(body, 100.0)
     held = (time > 4.02) & (time < 4.98)
@@ -201,11 +191,8 @@ def test_hold_under_soft_stage_sphere_creeps() -> None:
     assert (np.diff(force[held]) < 0).all()
 
 
-def test_adhesion_creep_together_limits() -> None:
-    """Adhesion and creep together have their limits.
-
-    Creep that is over at once is an elastic body of the relaxed modulus whose edge sees the unrelaxed one.
-    """
+def test_adhesion_and_creep_together_have_their_limits() -> None:
+    """Creep that is over at once is an elastic body of the relaxed modulus whose edge sees the unrelaxed one."""
     slow = replace(STICKY, relaxation=Relaxation((0.3,), (1e7,)))
     elastic, unrelaxed = (there_and_back(body, 1 / 3e-3)[3] for body in (STICKY, slow))
     assert unrelaxed == pytest.approx(elastic, abs=1e-5 * elastic.max())

@@ -19,8 +19,7 @@ from rig.truth import truth_of_curves, truth_of_lines
 from underskin.recordings import campaign as campaigns
 
 
-def test_seed_number_give_campaign() -> None:
-    """The same seed and number give the same campaign."""
+def test_the_same_seed_and_number_give_the_same_campaign() -> None:
     assert drawn(1, 2) == drawn(1, 2)
     assert drawn(1, 2) != drawn(1, 3)
     assert campaign(record(drawn(1, 2))) == campaign(record(drawn(1, 2)))
@@ -46,8 +45,7 @@ def test_all_effects_of_the_kind_are_drawn() -> None:
 
 
 @pytest.mark.slow
-def test_draws_campaigns_within_tables_truth() -> None:
-    """Draws are campaigns within the tables and their truth says what shows."""
+def test_draws_are_campaigns_within_the_tables_and_their_truth_says_what_shows() -> None:
     shows = []
     for number in range(8):
         recorded = record(drawn(7, number))
@@ -78,8 +76,7 @@ def test_curves_are_drawn_too(kind: str, count: int) -> None:
 
 
 @pytest.mark.parametrize(("what", "count"), [("none", 0), ("single", 1), ("pair", 2), ("unknown", 1)])
-def test_raw_curves_hide_asked_scales(what: str, count: int) -> None:
-    """Raw curves hide what is asked on both scales."""
+def test_raw_curves_hide_what_is_asked_on_both_scales(what: str, count: int) -> None:
     radii = []
     for number in range(8):
         random = np.random.default_rng([9, number])
@@ -113,22 +110,16 @@ def test_quiet_raw_curves_show_nothing() -> None:
 
 
 @pytest.mark.soak
-def test_shows_told_although_fit_goes_astray() -> None:
-    """What shows is told although a fit goes astray.
-
-    On its way the base model's fit of this pair tries contacts wider than the rig has solved.
-    """
+def test_what_shows_is_told_although_a_fit_goes_astray() -> None:
+    """On its way the base model's fit of this pair tries contacts wider than the rig has solved."""
     truth = truth_of_curves(*drawn_curves(31001, 5, INDENTATION, "pair"))
     assert truth["identifiable"]
     assert np.isfinite(truth["chi2_gain_of_truth"])
 
 
 @pytest.mark.soak
-def test_effect_visible_without_no_fit() -> None:
-    """An effect is visible without which the others have no fit.
-
-    Without the stage that gives, a body that stiffens to infinity has no force at the recorded depth.
-    """
+def test_an_effect_is_visible_without_which_the_others_have_no_fit() -> None:
+    """Without the stage that gives, a body that stiffens to infinity has no force at the recorded depth."""
     truth = truth_of_curves(*drawn_curves(36036, 45, INDENTATION, "pair"))
     assert set(truth["effects"]) == {"instrument_compliance", "strain_stiffening"}
     assert truth["every_effect_identifiable"]

@@ -71,11 +71,8 @@ def test_base_curves_are_hertz_s_and_neo_hookean() -> None:
     assert force == pytest.approx(E_MPA * np.pi / 4 * 20**2 * (stretch**-2 - stretch) / 3)
 
 
-def test_ramp_relaxes_hereditary_integral() -> None:
-    """A ramp relaxes as the hereditary integral.
-
-    Lee and Radok 1960: F(t) = ∫ E(t − s) d(c δ^(3/2)).
-    """
+def test_a_ramp_relaxes_as_the_hereditary_integral() -> None:
+    """Lee and Radok 1960: F(t) = ∫ E(t − s) d(c δ^(3/2))."""
     g, tau = 0.4, 5.0
     recorded, depth, force = curve("indentation", {"contact_creep": {"fraction": g, "time_s": tau}}, samples=400)
     time = np.array(recorded.entry["time_s"])
@@ -98,11 +95,9 @@ def test_slow_creep_has_no_memory_left() -> None:
     assert force == pytest.approx(0.6 * hertz(depth), abs=0.02 * float(hertz(1.0)))
 
 
-def test_adhesive_contact_tears_force_johnson() -> None:
-    """An adhesive contact tears at the force of johnson kendall and roberts.
-
-    Pull-off under displacement control comes after the least force, −(3/2)π w R; before contact there is none.
-    """
+@pytest.mark.slow
+def test_an_adhesive_contact_tears_at_the_force_of_johnson_kendall_and_roberts() -> None:
+    """Pull-off under displacement control comes after the least force, −(3/2)π w R; before contact there is none."""
     work = 5.0
     on = {"adhesion": {"work_j_per_m2": work}}
     _, depth, force = curve("indentation", on, samples=4000, largest_displacement_mm=0.6)
@@ -112,11 +107,8 @@ def test_adhesive_contact_tears_force_johnson() -> None:
     assert depth[going][force[going] < 0].min() < 0
 
 
-def test_base_below_thin_layer_stiffens_exact() -> None:
-    """The base below a thin layer stiffens it as the exact contact says.
-
-    By the integral equation, at a/h = 0.3 the force is 1.0197 times Hertz's at that a, δR/a² = 0.7945.
-    """
+def test_the_base_below_a_thin_layer_stiffens_it_as_the_exact_contact_says() -> None:
+    """By the integral equation, at a/h = 0.3 the force is 1.0197 times Hertz's at that a, δR/a² = 0.7945."""
     h, radius = 2.0, 5.0
     description = described("indentation", {"layered_contact": {}}, indenters_mm=[radius], samples=2000)
     description["skin"]["thickness_mm"] = h
@@ -126,8 +118,7 @@ def test_base_below_thin_layer_stiffens_exact() -> None:
     assert found == pytest.approx(1.0197 * 4 / 3 * E_MPA / 0.75 * a**3 / radius, rel=3e-4)
 
 
-def test_stage_gives_moves_further_force() -> None:
-    """Stage that gives moves further by force over stiffness."""
+def test_stage_that_gives_moves_further_by_force_over_stiffness() -> None:
     _, depth, force = curve("indentation", {"instrument_compliance": {"stiffness_n_per_mm": 5.0}})
     assert force == pytest.approx(hertz(depth - force / 5.0), rel=1e-4, abs=1e-5)
 
@@ -143,8 +134,7 @@ def test_every_effect_shows_and_is_seen_to_show(kind: str, name: str, values: di
     campaigns.parse(campaign_of_curves(planned, recorded))
 
 
-def test_without_effect_nothing_see() -> None:
-    """Without an effect there is nothing to see."""
+def test_without_an_effect_there_is_nothing_to_see() -> None:
     for kind in ("indentation", "compression"):
         planned = parse(described(kind, {}, force_noise_n=2e-3, contact_point_mm=0.01))
         assert -15 < visibility(planned, record_curves(planned)).chi2_gain < 1e-3  # two fitted parameters

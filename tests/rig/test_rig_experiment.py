@@ -93,13 +93,11 @@ def test_what_cannot_be_used_is_named(path: str, value: Any, message: str) -> No
         ("dwells_s", "contact_creep", "design.dwells_s = None: required by the effect contact_creep"),
     ],
 )
-def test_effect_names_needs_experiment(missing: str, effect: str, message: str) -> None:
-    """An effect names what it needs of the experiment."""
+def test_an_effect_names_what_it_needs_of_the_experiment(missing: str, effect: str, message: str) -> None:
     assert message in refused(put(f"design.{missing}", None), put("effects", {effect: PARAMETERS[effect]}))
 
 
-def test_command_says_wrong_line(tmp_path: Path) -> None:
-    """The command says what is wrong on one line."""
+def test_the_command_says_what_is_wrong_on_one_line(tmp_path: Path) -> None:
     file = tmp_path / "bad.yaml"
     for text, message in (
         ("schema: experiment/1\nname: x\nkind: [", "bad.yaml"),

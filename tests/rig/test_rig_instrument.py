@@ -14,6 +14,8 @@ from rig.visible_curves import visibility
 from tests.support.repository import ROOT
 from underskin.recordings import campaign as campaigns
 
+pytestmark = pytest.mark.slow
+
 TEXTBOOK = document(ROOT / "examples" / "rig" / "nanoindenter.yaml")
 
 
@@ -23,11 +25,8 @@ def textbook(effects: Any = None, **curves: Any) -> tuple[Any, RecordedCurve]:
     return experiment, record_curves(experiment)[0]
 
 
-def test_textbook_case_instrument_writes() -> None:
-    """The textbook case is what an instrument writes.
-
-    7.5 µm, 1 MPa, 40 and 75 mJ/m², 3 N/m, 3,100 samples, air on both sides, pulled off at −(3/2) π w_s R.
-    """
+def test_the_textbook_case_is_what_an_instrument_writes() -> None:
+    """7.5 µm, 1 MPa, 40 and 75 mJ/m², 3 N/m, 3,100 samples, air on both sides, pulled off at −(3/2) π w_s R."""
     experiment, curve = textbook()
     kept = campaigns.parse(campaign_of_curves(experiment, [curve]))
     assert kept.units_checked
@@ -48,8 +47,7 @@ def test_textbook_case_instrument_writes() -> None:
     ("field", "name", "step"),
     [("displacement_mm", "displacement_step_mm", 2e-6), ("force_n", "force_step_n", 5e-8)],
 )
-def test_values_multiples_converters_step(field: str, name: str, step: float) -> None:
-    """Values are multiples of the converters step."""
+def test_values_are_multiples_of_the_converters_step(field: str, name: str, step: float) -> None:
     _, curve = textbook(**{name: step})
     written = np.array(curve.entry[field])
     assert written / step == pytest.approx(np.round(written / step), abs=1e-4)
@@ -68,8 +66,7 @@ def test_the_baseline_drifts_in_time_or_travel(name: str) -> None:
     assert np.ptp(added) > 1e-9
 
 
-def test_ways_recording_end_states() -> None:
-    """The ways the recording can end and what it states."""
+def test_the_ways_the_recording_can_end_and_what_it_states() -> None:
     experiment, curve = textbook(retract=False, times=False, stage_declared=True, modulus_declared=True)
     written = campaign_of_curves(experiment, [curve])
     (entry,) = written["recordings"]
@@ -80,8 +77,7 @@ def test_ways_recording_end_states() -> None:
     campaigns.parse(written)
 
 
-def test_gain_chi2_independent_fit() -> None:
-    """The gain in chi2 is that of an independent fit."""
+def test_the_gain_in_chi2_is_that_of_an_independent_fit() -> None:
     effects = {"contact_creep": {"fraction": 0.05, "time_s": 2.0, "fraction_2": 0.05, "time_2_s": 10.0}}
     experiment, curve = textbook(effects, displacement_step_mm=0.0, hold_s=2.0)
     force, noise = np.array(curve.entry["force_n"]), np.hypot(1e-8, 2e-9 / np.sqrt(12))
@@ -98,8 +94,7 @@ def test_gain_chi2_independent_fit() -> None:
     assert found > 30
 
 
-def test_pair_weighed_beside() -> None:
-    """Each of a pair is weighed beside the other."""
+def test_each_of_a_pair_is_weighed_beside_the_other() -> None:
     effects = {"adhesion": {"work_j_per_m2": 0.04}, "instrument_compliance": {"stiffness_n_per_mm": 1e4}}
     experiment, curve = textbook(effects, samples=400)
     truth = truth_of_curves(experiment, [curve])

@@ -52,16 +52,14 @@ def neo_hookean(strain: np.ndarray) -> np.ndarray:
     return np.asarray((stretch**-2 - stretch) / 3)
 
 
-def test_block_stiff_shape_skins_modulus() -> None:
-    """A block is as stiff as its shape and the skins modulus."""
+def test_a_block_is_as_stiff_as_its_shape_and_the_skins_modulus() -> None:
     entry, shortening, force = quiet(block_description, {"modulus_error": {"factor": 3.0}})
     area = np.pi / 4 * entry["sample_diameter_mm"] ** 2
     expected = 2.0 * area * neo_hookean(shortening / entry["sample_height_mm"])
     assert force == pytest.approx(expected, abs=1e-9 * force.max())
 
 
-def test_platens_hold_block_make_stiffer_shape() -> None:
-    """Platens that hold the block make it stiffer by the shape factor."""
+def test_platens_that_hold_the_block_make_it_stiffer_by_the_shape_factor() -> None:
     for number in range(8):
         joint = joint_campaigns(4, number, "compression")
         curves, document = joint.documents[0].curves, joint.documents[0]
@@ -78,8 +76,7 @@ def test_platens_hold_block_make_stiffer_shape() -> None:
             assert slope == pytest.approx(document.true_modulus_mpa * (1 + 2 * friction * shape**2), rel=0.15)
 
 
-def test_sphere_skin_follows_hertz_modulus() -> None:
-    """A sphere on the skin follows hertz at its modulus."""
+def test_a_sphere_on_the_skin_follows_hertz_at_its_modulus() -> None:
     entry, depth, force = quiet(indentation_description, {})
     hertz = 4 / 3 * 2.0 / 0.75 * np.sqrt(entry["indenter_radius_mm"]) * np.maximum(depth, 0) ** 1.5
     assert force == pytest.approx(hertz, rel=1e-3, abs=1e-3 * hertz.max())
@@ -87,8 +84,7 @@ def test_sphere_skin_follows_hertz_modulus() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["compression", "indentation"])
-def test_curves_elastomer_lines_declared_off(what: str) -> None:
-    """Curves have the elastomer of the lines and what is declared is off in half."""
+def test_curves_have_the_elastomer_of_the_lines_and_what_is_declared_is_off_in_half(what: str) -> None:
     off, count = 0, 60 if SOAK else 12
     for number in range(count):
         document = joint_campaigns(7, number, what).documents[0]
@@ -108,16 +104,14 @@ def test_curves_elastomer_lines_declared_off(what: str) -> None:
     assert 0.3 < off / count < 0.7
 
 
-def test_seed_number_give_documents() -> None:
-    """The same seed and number give the same documents."""
+def test_the_same_seed_and_number_give_the_same_documents() -> None:
     for what in ("compression", "dates", "skins"):
         again = [document.campaign() for document in joint_campaigns(1, 2, what).documents]
         assert again == [document.campaign() for document in joint_campaigns(1, 2, what).documents]
         assert again != [document.campaign() for document in joint_campaigns(1, 3, what).documents]
 
 
-def test_nothing_changes_two_dates_noise() -> None:
-    """Nothing changes between two dates but noise."""
+def test_nothing_changes_between_two_dates_but_noise() -> None:
     joint = first("dates", set())
     before, after = (document.lines for document in joint.documents)
     assert before.response.plan.recorded_at != after.response.plan.recorded_at
@@ -133,8 +127,8 @@ def test_nothing_changes_two_dates_noise() -> None:
     assert not np.array_equal(before.measured[:3], after.measured[:3])
 
 
-def test_ages_said_date_sensors() -> None:
-    """What ages is said with its date and its sensors."""
+@pytest.mark.slow
+def test_what_ages_is_said_with_its_date_and_its_sensors() -> None:
     for number in range(60):
         joint = joint_campaigns(3, number, "dates")
         ageing = [hidden for hidden in joint.hidden if hidden.effect == "ageing"]
@@ -152,8 +146,8 @@ def test_ages_said_date_sensors() -> None:
     raise AssertionError("nothing ages")
 
 
-def test_skin_departs_few_recordings() -> None:
-    """One skin departs and one has few recordings."""
+@pytest.mark.slow
+def test_one_skin_departs_and_one_has_few_recordings() -> None:
     seen, counts = set(), set()
     for number in range(30):
         joint = joint_campaigns(8, number, "skins")
@@ -169,8 +163,7 @@ def test_skin_departs_few_recordings() -> None:
 
 
 @pytest.mark.slow
-def test_truths_json_documents_campaigns() -> None:
-    """Truths are json and documents are campaigns."""
+def test_truths_are_json_and_documents_are_campaigns() -> None:
     for what in WHAT if SOAK else ("compression", "skins"):
         for number in range(3) if SOAK else [QUICK[what]]:
             documents, truth = drawn_joint(9, number, what)
@@ -203,8 +196,7 @@ class Line:
         return np.array([(values["a"] + values["b"] - 1) / 0.1, (values["a"] - values["b"]) / 0.2])
 
 
-def test_fits_deviations_linear_problem_exact() -> None:
-    """Fits and deviations of a linear problem are exact."""
+def test_fits_and_deviations_of_a_linear_problem_are_exact() -> None:
     free = {"a": Prior(0.0, 1e6), "b": Prior(0.0, 1e6)}
     assert least_chi2([Line()], free) == pytest.approx(0, abs=1e-9)
     assert deviation([Line()], free, "a") == pytest.approx(np.hypot(0.1, 0.2) / 2, rel=1e-6)
@@ -212,8 +204,8 @@ def test_fits_deviations_linear_problem_exact() -> None:
     assert least_chi2([Line()], held) == pytest.approx(25 + 6.25, rel=1e-3)
 
 
-def test_command_writes_every_document_refuses(tmp_path: Path) -> None:
-    """The command writes every document and refuses what it does not draw."""
+@pytest.mark.slow
+def test_the_command_writes_every_document_and_refuses_what_it_does_not_draw(tmp_path: Path) -> None:
     arguments = ["draw", "--output-dir", str(tmp_path), "--count", "1", "--kind", "joint"]
     assert CliRunner().invoke(command, [*arguments, "--what", "skins"]).exit_code == 0
     files = sorted(file.name for file in (tmp_path / "campaigns").glob("*.json"))

@@ -1,9 +1,6 @@
 """The rig's own physics against exact values, limits and other routes; nothing of it is shared with the library."""
 
-import csv
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,29 +16,20 @@ from rig.layer_contacts import LayerContacts
 from rig.recorded import make_response
 from rig.true_response import TrueResponse
 from tests.support.cases import first
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows, sphere_rows
 from tests.support.rig_experiments import PARAMETERS, described
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 
 RHO = 0.6
 
 
-def rows(file: str) -> list[dict[str, str]]:
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / file).open(newline="") as stream:
-        return list(csv.DictReader(stream))
-
-
 def number(cell: str) -> float:
     return float(cell or 0.0)
 
 
-@NEEDS_ORACLE
-def test_stress_base_exact_every_layer() -> None:
-    """Stress on the base is exact for every layer."""
+def test_stress_on_the_base_is_exact_for_every_layer() -> None:
     layers: dict[tuple[float, float], np.ndarray] = {}
-    for row in rows("linear_layer.csv"):
-        if row["quantity"] not in ("sigma_hertz", "gamma_n"):
-            continue
+    for row in layer_rows("sigma_hertz", "gamma_n"):
         kind = number(row["poisson_ratio"]), 2 * float(row["glue_stiffness_h_over_2g"])
         if kind not in layers:
             layers[kind] = Layer(*kind).transmission(WAVENUMBERS)
@@ -51,21 +39,19 @@ def test_stress_base_exact_every_layer() -> None:
     assert len(layers) == 8
 
 
-@NEEDS_ORACLE
 def test_sphere_on_the_layer_is_exact() -> None:
     contact = sphere_contact(Layer())
-    for row in rows("sphere_on_layer.csv"):
-        a, radius = np.array([float(row["a_over_h"])]), 10.0
+    for row in sphere_rows():
+        a, radius = np.array([row["a_over_h"]]), 10.0
         hertz_force, hertz_stiffness = 4 / 3 / 0.75 * a**3 / radius, 2 * a / 0.75
-        assert contact.force(a, radius, 1.0) / hertz_force == pytest.approx(float(row["force_over_hertz"]), rel=2e-5)
+        assert contact.force(a, radius, 1.0) / hertz_force == pytest.approx(row["force_over_hertz"], rel=2e-5)
         depth = contact.depth(a, radius, 1.0) * radius / a**2
-        assert depth == pytest.approx(float(row["indentation_r_over_a2"]), rel=1e-5)
+        assert depth == pytest.approx(row["indentation_r_over_a2"], rel=1e-5)
         stiffness = contact.stiffness(a, 1.0) / hertz_stiffness
-        assert stiffness == pytest.approx(float(row["stiffness_over_hertz"]), rel=1e-6)
+        assert stiffness == pytest.approx(row["stiffness_over_hertz"], rel=1e-6)
 
 
-def test_stiffness_slope_force_over_depth() -> None:
-    """Stiffness is the slope of force over depth."""
+def test_stiffness_is_the_slope_of_force_over_depth() -> None:
     contact = sphere_contact(Layer(0.4))
     a, step = np.array([0.2, 0.8, 1.9]), 1e-4
     force, depth = (
@@ -74,8 +60,7 @@ def test_stiffness_slope_force_over_depth() -> None:
     assert np.diff(force, axis=0)[0] / np.diff(depth, axis=0)[0] == pytest.approx(contact.stiffness(a, 1.0), rel=1e-4)
 
 
-def test_adhesion_deep_layer_johnson_kendall() -> None:
-    """Adhesion on a deep layer is that of johnson kendall and roberts."""
+def test_adhesion_on_a_deep_layer_is_that_of_johnson_kendall_and_roberts() -> None:
     a, radius, work = np.array([0.02, 0.04]), 0.5, 1e-5
     plane = 1 / 0.75
     expected = 4 * plane * a**3 / (3 * radius) - np.sqrt(8 * math.pi * work * plane * a**3)
@@ -97,8 +82,7 @@ def test_finite_strain_at_the_prototypes_contact(load: float, ratio: float) -> N
 
 @pytest.mark.slow
 @pytest.mark.slow
-def test_finite_strain_kept_solver_gives_nodes() -> None:
-    """Finite strain as kept is what the solver gives between the nodes."""
+def test_finite_strain_as_kept_is_what_the_solver_gives_between_the_nodes() -> None:
     k = WAVENUMBERS[WAVENUMBERS < finite_strain_solve.HIGHEST_WAVENUMBER]
     for a in first(1, (1.03, 0.35)):
         solved = finite_strain_solve.added_spectrum(a, k, np.array([0.15, 0.3]))
@@ -106,8 +90,8 @@ def test_finite_strain_kept_solver_gives_nodes() -> None:
         assert kept == pytest.approx(solved, abs=2e-5)
 
 
-def test_solver_carries_whole_load_base() -> None:
-    """The solver carries the whole load to the base."""
+@pytest.mark.slow
+def test_the_solver_carries_the_whole_load_to_the_base() -> None:
     layer = finite_strain_solve.FiniteStrainLayer(finite_strain_solve.make_mesh(0.6))
     assert layer.load(0.6).sum() == pytest.approx(-1, rel=1e-12)
     state = np.zeros(layer.size)
@@ -125,8 +109,7 @@ def response(**changes: object) -> TrueResponse:
     return make_response(parse(described(**changes)))
 
 
-def test_frf_real_positive_compression_paper() -> None:
-    """The frf is real and positive in compression and what the paper says."""
+def test_the_frf_is_real_and_positive_in_compression_and_what_the_paper_says() -> None:
     lines = response(effects={}).lines(np.array([10.0, 100.0]))
     assert (lines.imag == 0).all()
     assert (lines.real > 0).all()
@@ -134,8 +117,7 @@ def test_frf_real_positive_compression_paper() -> None:
     assert lines[0, 0].real == pytest.approx(14 * 1.5 * RHO**2 * centred_sigma(a / 2.5, 0.5 / (16 * 16)), rel=1e-9)
 
 
-def test_resonance_tip_mass_contact_spring_say() -> None:
-    """Resonance where tip mass and contact spring say."""
+def test_resonance_where_tip_mass_and_contact_spring_say() -> None:
     rig = response(effects={"contact_resonance": {"tip_mass_g": 2.0, "damping": 0.01}})
     frequency = np.linspace(100, 2500, 24001)
     peak = frequency[np.argmax(np.abs(rig.lines(frequency)), axis=1)]
@@ -168,8 +150,7 @@ def test_relaxation_ladder_is_a_power_law() -> None:
     assert np.abs(ratio / ratio[20] - 1).max() < 2e-3
 
 
-def test_edges_move_agree_limit_small_amplitude() -> None:
-    """Edges that move agree in the limit of a small amplitude."""
+def test_edges_that_move_agree_in_the_limit_of_a_small_amplitude() -> None:
     moving, cycling = (
         response(effects={name: {key: 1.0}}, design={"dynamic_forces_n": [1e-3]}).effective_sigma
         for name, key in (("moving_contact_edge", "mobile_fraction"), ("amplitude_nonlinearity", "mobility"))
@@ -177,8 +158,7 @@ def test_edges_move_agree_limit_small_amplitude() -> None:
     assert moving == pytest.approx(cycling, rel=1e-5)
 
 
-def test_fast_oscillation_meets_unrelaxed() -> None:
-    """A fast oscillation meets the unrelaxed modulus on the contact that crept."""
+def test_a_fast_oscillation_meets_the_unrelaxed_modulus_on_the_contact_that_crept() -> None:
     crept = response(effects={"contact_creep": {"fraction": 0.4, "time_s": 10.0}}, design={"dwells_s": [1e6]})
     softer = response(effects={"modulus_error": {"factor": 0.6}})
     assert crept.contacts.contact_radius == pytest.approx(softer.contacts.contact_radius, rel=1e-12)
@@ -205,8 +185,7 @@ FREQUENCY = np.geomspace(2, 500, 12)
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_every_effect_base_model_limit(name: str) -> None:
-    """Every effect has the base model as its limit."""
+def test_every_effect_has_the_base_model_as_its_limit(name: str) -> None:
     base = response(effects={}).lines(FREQUENCY)
     assert response(effects={name: LIMITS[name]}).lines(FREQUENCY) == pytest.approx(base, rel=2e-6)
 
@@ -218,21 +197,18 @@ def test_every_effect_changes_the_response(name: str) -> None:
     assert np.abs(changed / base - 1).max() > 5e-3
 
 
-def test_every_effect_recording_kind_frf_tested() -> None:
-    """Every effect of a recording of kind frf is tested."""
+def test_every_effect_of_a_recording_of_kind_frf_is_tested() -> None:
     assert set(PARAMETERS) == {name for name, effect in effects.ALL_EFFECTS.items() if effects.FRF in effect.kinds}
     assert set(LIMITS) == set(PARAMETERS) - {"mains_pickup", "layered_contact"}
 
 
-def test_layered_contact_tends_hertz_thick_layer() -> None:
-    """Layered contact tends to hertz on a thick layer."""
+def test_layered_contact_tends_to_hertz_on_a_thick_layer() -> None:
     thick = {"skin": {"thickness_mm": 60.0, "sensor_radius_mm": 36.0, "array": {"pitch_mm": 72.0}}}
     base, layered = (response(effects=on, **thick).contacts.contact_radius for on in ({}, {"layered_contact": None}))
     assert layered == pytest.approx(base, rel=1e-4)
 
 
-def test_neighbour_s_charge_makes_stress() -> None:
-    """A neighbour s charge is what it makes of its own stress."""
+def test_a_neighbours_charge_is_what_it_makes_of_its_own_stress() -> None:
     under = {"preload_dependent_d33": {"beta_per_mpa": 3.0, "law": "linear"}}
     made = {
         "skin": {"array": {"columns": 2, "pitch_mm": 4.0}},
@@ -245,8 +221,7 @@ def test_neighbour_s_charge_makes_stress() -> None:
     assert coupled[second] == pytest.approx(alone[second] + 0.4 * alone[first], rel=1e-12)
 
 
-def test_neighbour_far_off_thin_skin_adds() -> None:
-    """A neighbour far off on a thin skin adds no charge."""
+def test_a_neighbour_far_off_on_a_thin_skin_adds_no_charge() -> None:
     thin = {
         "skin": {"thickness_mm": 0.2, "sensor_radius_mm": 0.1, "array": {"columns": 2, "pitch_mm": 8.0}},
         "design": {"preloads_n": [0.2], "indenters_mm": [4.0], "offsets_mm": [[0.0, 0.0]]},
@@ -257,14 +232,12 @@ def test_neighbour_far_off_thin_skin_adds() -> None:
 
 @pytest.mark.slow
 @pytest.mark.slow
-def test_effects_catalogue_work_together() -> None:
-    """All effects of the catalogue work together."""
+def test_all_effects_of_the_catalogue_work_together() -> None:
     together = {name: PARAMETERS[name] for name in PARAMETERS if name in effects.EFFECTS}
     assert np.isfinite(response(effects=together).lines(FREQUENCY)).all()
 
 
-def test_contact_beyond_solved_refused() -> None:
-    """A contact beyond what was solved is refused."""
+def test_a_contact_beyond_what_was_solved_is_refused() -> None:
     with pytest.raises(RigError, match=r"load parameter.*must be at most 0\.1"):
         response(skin={"youngs_modulus_mpa": 0.5}).lines(FREQUENCY)
     with pytest.raises(RigError, match=r"contact radius.*lower preload_n"):

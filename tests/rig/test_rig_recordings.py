@@ -56,8 +56,7 @@ IN_TIME = [
 
 
 @pytest.mark.parametrize("on", IN_TIME, ids=lambda on: "+".join(on) or "base")
-def test_time_series_frf_route(on: dict[str, Any]) -> None:
-    """Time series have the frf of the other route."""
+def test_time_series_have_the_frf_of_the_other_route(on: dict[str, Any]) -> None:
     response, series = series_of({}, on)
     for row, recorded in enumerate(series):
         frf = broadband(recorded.force_n, recorded.charge_pc, RATE)
@@ -80,11 +79,8 @@ def test_a_sweep_has_the_frf_of_the_other_route() -> None:
     assert np.abs(frf.values / response.lines(frf.frequency)[0] - 1)[inside].max() < 0.01
 
 
-def test_sweep_begins_anew_nothing_folds_back() -> None:
-    """Where a sweep begins anew nothing folds back.
-
-    The force jumps there: without the converter's filter the lowest lines are off by a percent.
-    """
+def test_where_a_sweep_begins_anew_nothing_folds_back() -> None:
+    """The force jumps there: without the converter's filter the lowest lines are off by a percent."""
     drive = {"kind": "sweep", "duration_s": 8.0, "sample_rate_hz": 512.0, "low_hz": 1.0, "high_hz": 130.0}
     response, series = series_of(drive | {"charge_noise_pc": 0.0}, {"amplifier_high_pass": {"corner_hz": 1.0}})
     frf = estimate(series[0].force_n, series[0].charge_pc, 512.0)
@@ -92,8 +88,7 @@ def test_sweep_begins_anew_nothing_folds_back() -> None:
     assert np.abs(frf.values / response.lines(frf.frequency)[0] - 1)[inside].max() < 2e-3
 
 
-def test_stepped_sine_frf_route() -> None:
-    """Stepped sine has the frf of the other route."""
+def test_stepped_sine_has_the_frf_of_the_other_route() -> None:
     on = {"contact_resonance": {"tip_mass_g": 3.0, "damping": 0.1}, "timing_delay": {"delay_us": 100.0}}
     response, series = series_of({"kind": "stepped_sine", "steps": 12}, on)
     frf = estimate(series[0].force_n, series[0].charge_pc, RATE)
@@ -101,11 +96,8 @@ def test_stepped_sine_frf_route() -> None:
     assert np.abs(frf.values / response.lines(frf.frequency)[0] - 1).max() < 3e-4
 
 
-def test_large_amplitude_shows_time_first() -> None:
-    """A large amplitude shows in time as its first harmonic.
-
-    The edge moves with the cycle: Fσ(F) at each instant has the first harmonic of the other route.
-    """
+def test_a_large_amplitude_shows_in_time_as_its_first_harmonic() -> None:
+    """The edge moves with the cycle: Fσ(F) at each instant has the first harmonic of the other route."""
     on = {"amplitude_nonlinearity": {"mobility": 1.0}}
     drive = {"kind": "stepped_sine", "steps": 6, "charge_noise_pc": 0.0002}
     response, series = series_of(drive, on, dynamic_n=0.8)
@@ -115,8 +107,7 @@ def test_large_amplitude_shows_time_first() -> None:
     assert np.abs(frf.values[0] / still.lines(frf.frequency)[0, 0] - 1) > 0.005
 
 
-def test_mains_shows_frequency_nowhere_else() -> None:
-    """Mains shows at its frequency and nowhere else."""
+def test_mains_shows_at_its_frequency_and_nowhere_else() -> None:
     _, series = series_of({"duration_s": 16.0}, {"mains_pickup": {"charge_pc": 0.5, "mains_hz": 50.0}})
     frf = broadband(series[0].force_n, series[0].charge_pc, RATE, block_samples=2048)
     assert frf.coherence is not None
@@ -133,8 +124,7 @@ def test_converter_rounds_and_stops_at_its_range() -> None:
     assert series[0].charge_pc.min() == -0.5
 
 
-def test_line_noise_coherence_described() -> None:
-    """Line noise and coherence are as described."""
+def test_line_noise_and_coherence_are_as_described() -> None:
     design = {"preloads_n": [1.0], "indenters_mm": [4.0], "repeats": 50}
     noise = {"gain": 0.03, "line": 0.02, "floor_pc_per_n": 0.05, "averages": 8.0}
     planned = parse(described(design=design, noise=noise, effects={}))
@@ -152,8 +142,7 @@ def test_line_noise_coherence_described() -> None:
 
 
 @pytest.mark.slow
-def test_d33_comes_back_within_stated() -> None:
-    """D33 comes back within the stated uncertainty."""
+def test_d33_comes_back_within_the_stated_uncertainty() -> None:
     runs = 200 if SOAK else 8
     table = underskin.load_table()
     inside, off = np.array([covered(number, table) for number in range(runs)]).T
@@ -162,8 +151,7 @@ def test_d33_comes_back_within_stated() -> None:
 
 
 @pytest.mark.slow
-def test_raw_recordings_read_description_written(tmp_path: Path) -> None:
-    """Raw recordings are read with the description written beside them."""
+def test_raw_recordings_are_read_with_the_description_written_beside_them(tmp_path: Path) -> None:
     description = described(
         lines=None, drive={**DRIVE, "duration_s": 1.0}, design={"offsets_mm": [[0.0, 0.0]], "preloads_n": [1.0]}
     )
@@ -183,8 +171,7 @@ def test_raw_recordings_read_description_written(tmp_path: Path) -> None:
         assert read.charge_pc == pytest.approx(kept.charge_pc, abs=1e-9)
 
 
-def test_seed_files_seed_noise(tmp_path: Path) -> None:
-    """Same seed same files other seed other noise."""
+def test_same_seed_same_files_other_seed_other_noise(tmp_path: Path) -> None:
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         carry_out(parse(described(seed=seed)), tmp_path / name)
     first, again, other = ((tmp_path / name / "campaign.json").read_bytes() for name in "abc")
@@ -206,8 +193,7 @@ def test_campaign_tells_nothing_of_the_truth(tmp_path: Path) -> None:
     campaigns.parse(document)
 
 
-def test_visibility_noise_without_effect_grows(tmp_path: Path) -> None:
-    """Visibility is noise without an effect and grows with one."""
+def test_visibility_is_noise_without_an_effect_and_grows_with_one(tmp_path: Path) -> None:
     gains = []
     for number, rate in enumerate((0.0, 0.05, 0.3)):
         carry_out(parse(described(effects={"ageing": {"rate": rate, "cycles": 200.0}})), tmp_path / str(number))
@@ -229,8 +215,7 @@ def test_examples_run(example: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_draws_campaigns_truth_beside(tmp_path: Path) -> None:
-    """Draws are campaigns with their truth beside them."""
+def test_draws_are_campaigns_with_their_truth_beside_them(tmp_path: Path) -> None:
     arguments = ["draw", "--output-dir", str(tmp_path), "--count", "3", "--seed", "4", "--what", "pair"]
     assert CliRunner().invoke(command, arguments).exit_code == 0
     truths = json.loads((tmp_path / "truth.json").read_text())

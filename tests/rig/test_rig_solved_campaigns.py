@@ -22,6 +22,7 @@ def design_of(number: int, world: World) -> Design:
     return drawn_design(np.random.default_rng([8, number]), world)
 
 
+@pytest.mark.slow
 def test_disc() -> None:
     """At small strain a disc, centred or beside the axis, bears the exact share of the force, and a wide one
     less than the whole by the long tail of an incompressible layer."""
@@ -71,8 +72,7 @@ def test_designs() -> None:
     assert sum(SHARES.values()) == pytest.approx(1)
 
 
-def test_creep() -> None:
-    """Creep softens from the modulus at once to its relaxed share."""
+def test_creep_softens_from_the_modulus_at_once_to_its_relaxed_share() -> None:
     relaxed = World(CREEP, {"fraction": 0.4, "time_s": 10.0}).relaxed(np.array([0.0, 10.0, 1e4]))
     assert relaxed[0] == 1
     assert relaxed[1] < 0.8

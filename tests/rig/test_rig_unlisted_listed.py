@@ -62,11 +62,8 @@ def test_every_mechanism_that_can_act_is_fitted() -> None:
 
 
 @pytest.mark.slow
-def test_mechanisms_reproduce_skin_parameter(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Mechanisms reproduce a skin with another parameter.
-
-    The base model of a skin with another E, h or position, made without the mechanism's own code.
-    """
+def test_mechanisms_reproduce_a_skin_with_another_parameter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The base model of a skin with another E, h or position, made without the mechanism's own code."""
     design = _design(4, "sensor", "y_mm", gain=0.002)
     base = log_amplitude(design, base_state(design))
     softer = replace(design, modulus_mpa=0.6 * design.modulus_mpa)
@@ -132,11 +129,8 @@ def test_a_small_amplitude_sees_a_moving_edge() -> None:
     assert predicted[0.8] > 1e-3
 
 
-def test_crosstalk_adds_charge_near_sensors() -> None:
-    """Crosstalk adds the charge of near sensors only.
-
-    Midway between two sensors both give the same; the third is 2 pitches away.
-    """
+def test_crosstalk_adds_the_charge_of_near_sensors_only() -> None:
+    """Midway between two sensors both give the same; the third is 2 pitches away."""
     design = _design(4)
     xy = np.array([[0.0, 0.0], [2.0, 0.0], [-4.0, 0.0]])
     middle = {n: replace(design.columns[n], values=np.full(design.count, v)) for n, v in (("x_mm", 1.0), ("y_mm", 0.0))}
@@ -157,8 +151,7 @@ def test_crosstalk_adds_charge_near_sensors() -> None:
         ],
     ),
 )
-def test_static_mechanisms_bench_recognised(companion: Companion, name: str) -> None:
-    """Static mechanisms of the bench are recognised."""
+def test_static_mechanisms_of_the_bench_are_recognised(companion: Companion, name: str) -> None:
     design = _design(4, "load_cycles")
     data = measure(np.random.default_rng(2), design, None, companion)
     seen = amplitudes(design, data, np.ones_like(data.frf), None, base_state(design))
@@ -168,12 +161,12 @@ def test_static_mechanisms_bench_recognised(companion: Companion, name: str) -> 
     assert found[name] < design.count + 4.0 * np.sqrt(2.0 * design.count)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "parameters"),
     [("timing_delay", (500.0,)), ("amplifier_high_pass", (0.4,)), ("contact_resonance", (1.5, 0.08))],
 )
-def test_spectral_mechanisms_bench_recognised(name: str, parameters: tuple[float, ...]) -> None:
-    """Spectral mechanisms of the bench are recognised."""
+def test_spectral_mechanisms_of_the_bench_are_recognised(name: str, parameters: tuple[float, ...]) -> None:
     design = _design(4)
     data = measure(np.random.default_rng(2), design, None, Companion(name, parameters))
     lines = Lines(design, data, None, base_state(design))
@@ -184,6 +177,7 @@ def test_spectral_mechanisms_bench_recognised(name: str, parameters: tuple[float
     assert found[name] < freedom + 4.0 * np.sqrt(2.0 * freedom)
 
 
+@pytest.mark.slow
 def test_pick_up_of_the_mains_is_recognised() -> None:
     """A charge of random phase at 50 Hz and its harmonics, larger where the dynamic force is smaller."""
     design = replace(_design(4), frequency_hz=np.array([2.0, 5.0, 10.0, 20.0, 35.0, 49.0, 75.0, 101.0, 125.0, 149.0]))
@@ -214,13 +208,9 @@ def test_pick_up_of_the_mains_is_recognised() -> None:
         (Law("gain", "load_cycles", "saturating", (2000.0,), (-0.12,)), "load_cycles", {"ageing"}),
     ]),
 )  # fmt: skip
-def test_law_listed_mechanism_not_identifiable(law: Law, needs: str, names: set[str]) -> None:
-    """A law that is a listed mechanism is not identifiable.
-
-    A radius that saturates over the dwell time; a gain that falls with load cycles; H near exp(-i w t0).
-
-    A relaxation far above the band is a delay as well.
-    """
+def test_a_law_that_is_a_listed_mechanism_is_not_identifiable(law: Law, needs: str, names: set[str]) -> None:
+    """A radius that saturates over the dwell time; a gain that falls with load cycles; H near exp(-i w t0). A
+    relaxation far above the band is a delay as well."""
     entry = _entry(_design(4, needs), law)
     assert entry["chi2_gain_over_base"] > 2.0 * IDENTIFIABLE
     assert entry["chi2_gain_over_best_listed"] < IDENTIFIABLE
@@ -229,17 +219,16 @@ def test_law_listed_mechanism_not_identifiable(law: Law, needs: str, names: set[
 
 
 @pytest.mark.slow
-def test_companion_catalogue_not_hide_law() -> None:
-    """A companion of the catalogue does not hide a law."""
+def test_a_companion_of_the_catalogue_does_not_hide_a_law() -> None:
     law = Law("gain", "temperature_c", "linear", (), (0.2,))
     entry = _entry(_design(4, "temperature_c"), law, Companion("preload_dependent_d33", (0.3,)))
     assert entry["chi2_gain_over_best_listed"] > 0.7 * entry["chi2_gain_over_base"] > 100.0
 
 
-def test_companion_replaced_mechanism_kept(
+@pytest.mark.slow
+def test_a_companion_is_replaced_by_its_own_mechanism_and_kept_beside_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A companion is replaced by its own mechanism and kept beside the others."""
     only_of(monkeypatch, "crosstalk", "misalignment", "preload_dependent_d33")
     design, companion = _design(4), Companion("preload_dependent_d33", (1.0,))
     data = measure(np.random.default_rng(2), design, None, companion)
@@ -251,11 +240,8 @@ def test_companion_replaced_mechanism_kept(
 
 
 @pytest.mark.soak
-def test_base_model_within_reach_mechanisms() -> None:
-    """The base model is within reach of the mechanisms.
-
-    Where there is no law, the best mechanism gains what a few parameters gain from noise, and never less than 0.
-    """
+def test_the_base_model_is_within_reach_of_the_mechanisms() -> None:
+    """Where there is no law, the best mechanism gains what a few parameters gain from noise, and never less than 0."""
     gains = []
     for seed in range(5):
         design = _design(seed, gain=0.02)
@@ -266,11 +252,8 @@ def test_base_model_within_reach_mechanisms() -> None:
     assert np.median(gains) < 12.0
 
 
-def test_gains_loss_angle_angles_lines() -> None:
-    """Gains of a loss angle are the same on angles and on lines.
-
-    The gain over the base model is counted on angles, that of the mechanisms on lines.
-    """
+def test_gains_of_a_loss_angle_are_the_same_on_angles_and_on_lines() -> None:
+    """The gain over the base model is counted on angles, that of the mechanisms on lines."""
     design = _design(4)
     law = Law("frequency_response", "order", "linear", (), (0.05,))
     data = measure(np.random.default_rng(2), design, law, None)

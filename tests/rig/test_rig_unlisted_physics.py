@@ -15,30 +15,17 @@ from rig.unlisted.layer import (
     transfer,
 )
 from rig.unlisted.response import REFERENCE_HZ, MinimumPhase, frequency_law
-from tests.support.oracle import oracle_rows
+from tests.support.oracle import linear_layer_values, sphere_rows
 
 
 def test_sigma_against_the_exact_layer() -> None:
-    rows = [
-        r
-        for r in oracle_rows("linear_layer.csv")
-        if (r["quantity"], r["poisson_ratio"], r["glue_stiffness_h_over_2g"]) == ("sigma_hertz", "0.5", "inf")
-    ]
-    a, rho, e, exact = (
-        np.array([float(r[k]) for r in rows]) for k in ("a_over_h", "rt_over_h", "offset_over_h", "value")
-    )
-    assert len(rows) > 200
+    rho, a, e, exact = linear_layer_values("sigma_hertz")
+    assert len(a) > 200
     np.testing.assert_allclose(sigma(a, rho, e), exact, atol=5e-8)
 
 
-def test_sigma_of_four_published_cases() -> None:
-    a, rho = np.array([0.289, 0.3, 0.6, 1.0]), np.array([0.2, 0.6, 0.6, 0.6])
-    np.testing.assert_allclose(sigma(a, rho, 0.0), [1.35506, 0.936505, 0.799567, 0.568500], atol=1e-5)
-
-
 def test_stiffness_against_the_exact_sphere() -> None:
-    rows = oracle_rows("sphere_on_layer.csv")
-    a, exact = (np.array([float(r[k]) for r in rows]) for k in ("a_over_h", "stiffness_over_hertz"))
+    a, exact = (np.array([row[name] for row in sphere_rows()]) for name in ("a_over_h", "stiffness_over_hertz"))
     np.testing.assert_allclose(stiffness_ratio(a), exact, rtol=1e-6)
 
 
@@ -68,8 +55,7 @@ def test_hertz_and_its_exponents() -> None:
     assert a[2] == pytest.approx(2.0 * a[0])
 
 
-def test_finite_strain_estimate_vanishes_load() -> None:
-    """Finite strain estimate vanishes with the load."""
+def test_finite_strain_estimate_vanishes_with_the_load() -> None:
     assert float(finite_strain_shift(np.array([1e-9]), np.array([10.0]), 16.0)[0]) < 1e-4
     assert float(finite_strain_shift(np.array([1.6]), np.array([10.0]), 16.0)[0]) == pytest.approx(0.01285, abs=1e-4)
 
@@ -99,7 +85,7 @@ def test_closed_forms_are_minimum_phase(form: str, p: list[float]) -> None:
 
 def test_echo_is_minimum_phase() -> None:
     """1 + r e^(-i w T) has no zero in the right half plane for |r| < 1: its phase returns to zero with each period."""
-    f = np.linspace(1.0, 400.0, 4001)
+    f = np.linspace(1.0, 400.0, 1001)
     h = frequency_law("periodic", np.array([0.3, np.log(50.0)]), MinimumPhase(f))
     assert np.abs(np.angle(h)).max() == pytest.approx(np.arcsin(0.3), rel=1e-3)
 

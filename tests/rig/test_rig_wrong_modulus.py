@@ -9,8 +9,8 @@ from rig.recorded import record_lines
 from rig.wrong_modulus import drawn_wrong_modulus, wrong_modulus
 
 
-def test_declared_modulus_wrong_factor_two_four() -> None:
-    """The declared modulus is wrong by a factor of two to four."""
+@pytest.mark.slow
+def test_the_declared_modulus_is_wrong_by_a_factor_of_two_to_four() -> None:
     factors, kinds = [], set()
     for number in range(12):
         joint = wrong_modulus(3, number)
@@ -26,8 +26,7 @@ def test_declared_modulus_wrong_factor_two_four() -> None:
     assert kinds == {"frf", "compression", "indentation"}
 
 
-def test_lines_skin_true_modulus() -> None:
-    """The lines are those of a skin of the true modulus."""
+def test_the_lines_are_those_of_a_skin_of_the_true_modulus() -> None:
     joint = wrong_modulus(3, 1)
     document = joint.documents[0]
     described = dict(document.experiment.document)
@@ -51,11 +50,8 @@ def test_the_truth_has_the_contacts_as_declared() -> None:
 
 
 @pytest.mark.slow
-def test_contacts_computed_beyond_made() -> None:
-    """Some contacts are computed beyond what was made.
-
-    By the declared E wider or harder pressed than the rig can calculate, and than the tables hold.
-    """
+def test_some_contacts_are_computed_beyond_what_was_made() -> None:
+    """By the declared E wider or harder pressed than the rig can calculate, and than the tables hold."""
     beyond = 0
     numbers = range(20) if SOAK else (0, 4, 5, 7)  # quickly drawn
     for number in numbers:

@@ -6,22 +6,13 @@ from typing import Any
 
 from rig.description import parse as experiment
 from rig.elastomer import campaign_of_curves, record_curves
-from rig.recorded import campaign as campaign_of_lines
-from rig.recorded import record_lines
+from tests.support import skins
 from tests.support.lean_reports import lean_report
 from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
-SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14}
-LINES: dict[str, Any] = {
-    "schema": "experiment/1",
-    "name": "together",
-    "kind": "frf",
-    "skin": {**SKIN, "array": {"columns": 4, "rows": 2, "pitch_mm": 8}},
-    "design": {"indenters_mm": [4, 10], "preloads_n": [0.5, 1, 2, 3, 5], "dynamic_forces_n": [0.09]},
-    "lines": {"low_hz": 1, "high_hz": 130, "count": 20},
-    "noise": {"gain": 0.02, "line": 0.01, "coherence": True},
-}
+LINES: dict[str, Any] = {**skins.LINES, "name": "together"}
+SKIN: dict[str, Any] = {name: value for name, value in LINES["skin"].items() if name != "array"}
 BLOCK: dict[str, Any] = {
     "heights_mm": [12],
     "diameters_mm": [20],
@@ -36,20 +27,12 @@ SPHERE: dict[str, Any] = {
     "samples": 300,
     "force_noise_n": 0.002,
 }
-Effects = Mapping[str, Mapping[str, float | str]]
+Effects = skins.Effects
 
 
 def lines(modulus: float = 16.0, effects: Effects | None = None, seed: int = 5) -> dict[str, Any]:
     """FRFs of a skin of this modulus [MPa], declared to have 16."""
-    described = {
-        **LINES,
-        "seed": seed,
-        "skin": {**LINES["skin"], "youngs_modulus_mpa": modulus},
-        "effects": effects or {},
-    }
-    document = campaign_of_lines(record_lines(experiment(described)))
-    document["skin"]["youngs_modulus_mpa"] = 16.0
-    return document
+    return skins.document("together", None, modulus=modulus, effects=effects, seed=seed)
 
 
 def curves(

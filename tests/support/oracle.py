@@ -1,4 +1,7 @@
-"""The exact values beside the repository (`UNDERSKIN_ORACLE`), computed independently of this project."""
+"""The exact values beside the repository (`UNDERSKIN_ORACLE`), computed independently of this project.
+
+A test that asks for them is skipped where the folder is not named.
+"""
 
 import csv
 import os
@@ -9,13 +12,9 @@ import pytest
 
 from underskin.units import Floats
 
-NEEDS_ORACLE = pytest.mark.skipif(
-    "UNDERSKIN_ORACLE" not in os.environ, reason="UNDERSKIN_ORACLE does not name the folder of exact values"
-)
 
-
-def oracle_rows(name: str) -> list[dict[str, str]]:
-    """The rows of one file, as texts by the names in its header; a test is skipped where the folder is not named."""
+def _rows(name: str) -> list[dict[str, str]]:
+    """As texts by the names in the file's header."""
     folder = os.environ.get("UNDERSKIN_ORACLE")
     if not folder:
         pytest.skip("UNDERSKIN_ORACLE does not name the folder of exact values")
@@ -23,13 +22,23 @@ def oracle_rows(name: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def layer_rows(*quantities: str, **fixed: str) -> list[dict[str, str]]:
+    """Of the linear layer; κ is twice `glue_stiffness_h_over_2g`."""
+    return [
+        row
+        for row in _rows("linear_layer.csv")
+        if row["quantity"] in quantities and all(row[name] == value for name, value in fixed.items())
+    ]
+
+
+def sphere_rows() -> list[dict[str, float]]:
+    """Of a sphere on the bonded, incompressible layer."""
+    return [{name: float(value) for name, value in row.items()} for row in _rows("sphere_on_layer.csv")]
+
+
 def linear_layer_values(quantity: str) -> tuple[Floats, Floats, Floats, Floats]:
     """rt_over_h, a_over_h, offset_over_h and value of the bonded, incompressible rows of one quantity."""
-    rows = [
-        row
-        for row in oracle_rows("linear_layer.csv")
-        if row["quantity"] == quantity and row["poisson_ratio"] == "0.5" and row["glue_stiffness_h_over_2g"] == "inf"
-    ]
+    rows = layer_rows(quantity, poisson_ratio="0.5", glue_stiffness_h_over_2g="inf")
     names = ("rt_over_h", "a_over_h", "offset_over_h", "value")
     rho, a, offset, value = (np.array([float(row[name] or "nan") for row in rows]) for name in names)
     return rho, a, offset, value

@@ -24,12 +24,12 @@ LINES: dict[str, Any] = {
     "noise": {"gain": 0.02, "line": 0.01, "coherence": True},
 }
 HEAVY_TIP = {"contact_resonance": {"tip_mass_g": 4, "damping": 0.05}}
-Effects = Mapping[str, Mapping[str, float]]
+Effects = Mapping[str, Mapping[str, float | str]]
 
 
 def document(
     name: str,
-    start: str = "2017-05-03T09:00:00Z",
+    start: str | None = "2017-05-03T09:00:00Z",
     *,
     effects: Effects | None = None,
     seed: int = 5,
@@ -38,11 +38,12 @@ def document(
     thickness: float = 2.5,
     skin: str | None = None,
 ) -> dict[str, Any]:
-    """A campaign/1 of a skin that is declared to have 16 MPa, and the thickness that it has."""
+    """A campaign/1 of a skin that is declared to have 16 MPa, and the thickness that it has; without times where no
+    start is given."""
     described = deepcopy(LINES) | {"name": name, "seed": seed, "effects": effects or {}}
     described["skin"] |= {"youngs_modulus_mpa": modulus, "d33_pc_per_n": d33, "thickness_mm": thickness}
     described["skin"] |= {} if skin is None else {"id": skin}
-    described["design"] |= {"start": start}
+    described["design"] |= {} if start is None else {"start": start}
     made = campaign_of_lines(record_lines(experiment(described)))
     made["skin"]["youngs_modulus_mpa"] = 16.0
     return made

@@ -75,11 +75,8 @@ def contacts(table: ContactTable) -> Contacts:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("radius", "load"), first(1, [(1.6, 0.1), (4.0, 0.05), (1.6, 0.01), (0.5, 0.1)]))
-def test_independent_code_finds_contact(contacts: Contacts, radius: float, load: float) -> None:
-    """An independent code finds the same contact.
-
-    FElupe at the table's indentation: the force (3 G = E), the contact radius to its mesh, and the stress.
-    """
+def test_an_independent_code_finds_the_same_contact(contacts: Contacts, radius: float, load: float) -> None:
+    """FElupe at the table's indentation: the force (3 G = E), the contact radius to its mesh, and the stress."""
     contact = contacts.at(3 * load * radius**2, radius)
     rho = RHO[1:4]
     force, a, sigma = felupe_contact.press(radius, contact.indentation, contact.a, rho.tolist())
@@ -107,8 +104,7 @@ def test_fresh_solves_off_the_nodes(table: ContactTable, contacts: Contacts, edg
 
 
 @pytest.mark.parametrize("radius", [0.5, 1.1, 3.0, 8.0])
-def test_stiffness_slope_force_over_indentation(contacts: Contacts, radius: float) -> None:
-    """Stiffness is the slope of force over indentation."""
+def test_stiffness_is_the_slope_of_force_over_indentation(contacts: Contacts, radius: float) -> None:
     force = 3 * 0.05 * radius**2
     low, high = (contacts.at(force * f, radius).indentation for f in (0.99, 1.01))
     assert contacts.at(force, radius).stiffness == pytest.approx(0.02 * force / (high - low), rel=1e-3)
@@ -123,11 +119,8 @@ def test_a_small_contact_is_the_sigma_tables(contacts: Contacts) -> None:
 
 
 @pytest.mark.parametrize(("load", "most"), [(0.001, 0.006), (0.01, 0.013), (0.1, 0.03)])
-def test_finite_strain_adds_little_beneath(contacts: Contacts, load: float, most: float) -> None:
-    """Finite strain adds little beneath a sphere.
-
-    Less than under Hertz' pressure as a dead load; what README.md and the findings of /v1/stress say.
-    """
+def test_finite_strain_adds_little_beneath_a_sphere(contacts: Contacts, load: float, most: float) -> None:
+    """Less than under Hertz' pressure as a dead load; what README.md and the findings of /v1/stress say."""
     for radius in np.geomspace(0.5, 8, 7):
         contact = contacts.at(3 * load * radius**2, float(radius))
         assert np.abs(contact.sigma / contact.linear_sigma - 1).max() < 1.02 * most
@@ -149,8 +142,7 @@ def test_the_correction_keeps_the_force(table: ContactTable) -> None:
     assert np.abs(moment).max() < 1e-3
 
 
-def test_reported_errors_balance_forces(table: ContactTable) -> None:
-    """Reported errors and the balance of forces."""
+def test_reported_errors_and_the_balance_of_forces(table: ContactTable) -> None:
     assert table.attributes["force_balance_error"] < 1e-5
     assert 0 < table.correction_error.max() < 5e-3
     assert table.domain["a_over_h"] == (0.0, 3.0)

@@ -29,11 +29,8 @@ def test_tables_agree_with_an_independent_code(a: float, rho: float, load: float
 
 
 @pytest.mark.slow
-def test_codes_meet_exact_layer_values_record() -> None:
-    """Both codes meet the exact layer the values on record and each other.
-
-    The exact linear layer shows FElupe's own error; σ(L)/σ(0) at ρ = 0.6 is of a third computation (± 5e-5).
-    """
+def test_both_codes_meet_the_exact_layer_the_values_on_record_and_each_other() -> None:
+    """The exact linear layer shows FElupe's own error; σ(L)/σ(0) at ρ = 0.6 is of a third computation (± 5e-5)."""
     rho = [0.0, 0.2, 0.6, 1.0, 3.0]
     linear = linear_layer.sigma(0.3, np.array(rho))
     table, layer = load_table(), felupe_layer.FelupeLayer(0.3)

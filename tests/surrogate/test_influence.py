@@ -1,7 +1,5 @@
 """The influence table: the exact linear layer for every skin, fields of pressure, and what lies outside."""
 
-import csv
-import os
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +10,7 @@ import pytest
 from bench.soak import SOAK
 from tablegen.influence import solve_influence
 from tablegen.influence_table import make_influence_table
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import layer_rows
 from underskin import TableError
 from underskin.array_stress.load_integration import Load, array_stress, contact_load, pressure_map_loads
 from underskin.physics import elastic_layer
@@ -39,11 +37,6 @@ def hertz_load(a: float, place: Floats) -> Load:
     return contact_load(place, (0.0, 0.0, 1.0), SpherePressure(a, HERTZ_SHAPE), 1.0)
 
 
-def oracle_rows(*quantities: str) -> list[dict[str, str]]:
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "linear_layer.csv").open(newline="") as file:
-        return [row for row in csv.DictReader(file) if row["quantity"] in quantities]
-
-
 def numbers(row: dict[str, str]) -> tuple[float, float, float, float, float]:
     """ν, slip, ρ, r̂/h and the value of a row; its glue stiffness is κ/2."""
     names = ("poisson_ratio", "rt_over_h", "offset_over_h", "value")
@@ -51,11 +44,11 @@ def numbers(row: dict[str, str]) -> tuple[float, float, float, float, float]:
     return poisson_ratio, elastic_layer.slip(2 * float(row["glue_stiffness_h_over_2g"])), rho, offset, value
 
 
-@NEEDS_ORACLE
+@pytest.mark.slow
 @pytest.mark.parametrize("quantity", ["gamma_n", "gamma_t"])
 def test_point_forces_equal_the_oracle(quantity: str) -> None:
     found, exact = [], []
-    for poisson_ratio, slip, rho, offset, value in map(numbers, oracle_rows(quantity)):
+    for poisson_ratio, slip, rho, offset, value in map(numbers, layer_rows(quantity)):
         influence = TABLE.at(rho, poisson_ratio, slip)
         assert influence is not None
         found.append(float(getattr(influence, quantity)(offset)))
@@ -64,11 +57,9 @@ def test_point_forces_equal_the_oracle(quantity: str) -> None:
     assert_accurate(np.array(found), np.array(exact))
 
 
-@NEEDS_ORACLE
-def test_hertz_pressure_beside_sensor_equals() -> None:
-    """The hertz pressure beside the sensor equals the oracle."""
+def test_the_hertz_pressure_beside_the_sensor_equals_the_oracle() -> None:
     found, exact = [], []
-    for row in oracle_rows("sigma_hertz")[:: 1 if SOAK else 4]:
+    for row in layer_rows("sigma_hertz")[:: 1 if SOAK else 4]:
         poisson_ratio, slip, rho, offset, value = numbers(row)
         influence = TABLE.at(rho, poisson_ratio, slip)
         assert influence is not None
@@ -80,8 +71,8 @@ def test_hertz_pressure_beside_sensor_equals() -> None:
     assert_accurate(np.array(found), np.array(exact))
 
 
-def test_every_skin_domain_meets_exact_layer() -> None:
-    """Every skin of the domain meets the exact layer within the reported error."""
+@pytest.mark.slow
+def test_every_skin_of_the_domain_meets_the_exact_layer_within_the_reported_error() -> None:
     r = np.linspace(0, 12, 121)
     for _ in range(40 if SOAK else 20):
         poisson_ratio, slip, rho = (GENERATOR.uniform(*limits) for limits in list(TABLE.domain.values())[:3])
@@ -108,19 +99,15 @@ def test_reported_errors_are_small() -> None:
 @pytest.mark.parametrize(
     ("poisson_ratio", "slip", "orders"), [(0.5, 0.0, (2, 3)), (0.5, 1.0, (2, 3)), (0.35, 0.2, (2, 3, 4))]
 )
-def test_elements_converge_exact_layer(poisson_ratio: float, slip: float, orders: Sequence[int]) -> None:
-    """The elements converge to the exact layer."""
+def test_the_elements_converge_to_the_exact_layer(poisson_ratio: float, slip: float, orders: Sequence[int]) -> None:
     rho, r = np.array([0.1, 0.6, 2.0]), np.linspace(0, 6, 13)
     exact = elastic_layer.gamma_n(Layer(poisson_ratio, slip), r, rho[:, None])
     errors = [np.abs(solve_influence(poisson_ratio, slip, rho, r, order).normal - exact).max() for order in orders]
     assert all(coarse > 3 * fine for coarse, fine in pairwise(errors))
 
 
-def test_load_balance_base_bears() -> None:
-    """A load in balance is all that the base bears.
-
-    ∫ T̄ over the places of a sensor is −F3 but for what lies beyond the reach, below 2e-4 of it.
-    """
+def test_a_load_in_balance_is_all_that_the_base_bears() -> None:
+    """∫ T̄ over the places of a sensor is −F3 but for what lies beyond the reach, below 2e-4 of it."""
     influence = TABLE.at(0.5)
     assert influence is not None
     x, weight = np.polynomial.legendre.leggauss(80)
@@ -144,8 +131,7 @@ def test_superposition_mirror_and_rotation() -> None:
     assert mirrored == pytest.approx(whole, rel=1e-12)
 
 
-def test_force_points_away_sensor_pulls() -> None:
-    """A force that points away from the sensor pulls at it."""
+def test_a_force_that_points_away_from_the_sensor_pulls_at_it() -> None:
     influence = TABLE.at(0.6)
     assert influence is not None
     sensors, place = np.zeros((1, 2)), np.array([[0.8, 0.0]])
@@ -156,8 +142,7 @@ def test_force_points_away_sensor_pulls() -> None:
 
 
 @pytest.mark.parametrize("cells", [21, 201])
-def test_map_hertz_pressure_gives_contact(cells: int) -> None:
-    """A map of the hertz pressure gives the contact."""
+def test_a_map_of_the_hertz_pressure_gives_the_contact(cells: int) -> None:
     influence = TABLE.at(0.6)
     assert influence is not None
     a, sensors = 1.0, np.array([[0.0, 0.0], [0.7, 0.4], [3.0, -1.0]])
@@ -170,11 +155,8 @@ def test_map_hertz_pressure_gives_contact(cells: int) -> None:
     assert found == pytest.approx(contact, rel=1.5 / cells)
 
 
-def test_uniform_pressure_over_wide_cells() -> None:
-    """Uniform pressure over wide cells is integrated within them.
-
-    Cells twice as wide as the layer is thick give what a map of narrow ones gives.
-    """
+def test_uniform_pressure_over_wide_cells_is_integrated_within_them() -> None:
+    """Cells twice as wide as the layer is thick give what a map of narrow ones gives."""
     influence = TABLE.at(0.6)
     assert influence is not None
     sensors = np.array([[0.3, 0.0], [2.0, 1.0]])
@@ -185,8 +167,7 @@ def test_uniform_pressure_over_wide_cells() -> None:
     assert first == pytest.approx(second, rel=3e-5)
 
 
-def test_beyond_reach_nothing_extrapolated() -> None:
-    """Beyond the reach nothing is extrapolated."""
+def test_beyond_the_reach_nothing_is_extrapolated() -> None:
     influence = TABLE.at(0.6)
     assert influence is not None
     assert np.isnan(influence.gamma_n([12.01, -0.1])).all()

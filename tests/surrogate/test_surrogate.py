@@ -11,7 +11,7 @@ import pytest
 
 from tablegen import linear_layer
 from tablegen.sigma import Nodes, solve_column
-from tests.support.oracle import NEEDS_ORACLE, linear_layer_values
+from tests.support.oracle import linear_layer_values
 from underskin import TableError, load_table
 from underskin.surrogate.hdf5_format import data_hash, read_table, tables_folder
 from underskin.surrogate.sigma_table import SigmaTable
@@ -21,7 +21,6 @@ GENERATOR = np.random.default_rng(2018)
 SOAK = "UNDERSKIN_SOAK" in os.environ
 
 
-@NEEDS_ORACLE
 def test_linear_limit_equals_the_oracle() -> None:
     rho, a, offset, value = linear_layer_values("sigma_hertz")
     used = (offset == 0) & (value > 0.01) & (a <= 3) & (rho <= 3)
@@ -29,8 +28,7 @@ def test_linear_limit_equals_the_oracle() -> None:
     assert TABLE.sigma(a[used], rho[used]).sigma == pytest.approx(value[used], rel=1e-6)
 
 
-def test_linear_limit_nodes_limits() -> None:
-    """Linear limit between the nodes and at the limits."""
+def test_linear_limit_between_the_nodes_and_at_the_limits() -> None:
     a = np.concatenate([[0.0, 3.0], GENERATOR.uniform(0, 3, 60)])
     rho = np.concatenate([[0.0, 3.0], GENERATOR.uniform(0, 3, 60)])[:, None]
     assert TABLE.sigma(a, rho).sigma == pytest.approx(linear_layer.sigma(a, rho), rel=2e-6)
@@ -49,8 +47,7 @@ def test_point_load_knows_no_finite_strain() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(50 if SOAK else 1))
-def test_finer_solves_agree_within_reported(number: int) -> None:
-    """Finer solves agree within the reported error."""
+def test_finer_solves_agree_within_the_reported_error(number: int) -> None:
     generator = np.random.default_rng([50, number])
     a = generator.uniform(0.02, 0.5) if number % 3 == 0 else generator.uniform(0, 3)
     rho, load = generator.uniform(0, 3), generator.uniform(0, 0.1)
@@ -62,8 +59,7 @@ def test_finer_solves_agree_within_reported(number: int) -> None:
     assert (np.abs(answer.sigma / fresh - 1) <= answer.rel_error).all()
 
 
-def test_reported_error_small_elements_error() -> None:
-    """Reported error is small and the elements own error is not hidden."""
+def test_reported_error_is_small_and_the_elements_own_error_is_not_hidden() -> None:
     points = [GENERATOR.uniform(low, high, 20000) for low, high in TABLE.domain.values()]
     error = TABLE.sigma(*points).rel_error
     assert np.median(error) <= 2e-5
@@ -83,13 +79,11 @@ def test_derivatives_match_finite_differences() -> None:
         assert slope == pytest.approx((up - down) / (2 * steps[axis, 0]), rel=2e-4, abs=1e-5)
 
 
-def test_derivative_load_infinite_zero_load() -> None:
-    """Derivative in the load is infinite at zero load."""
+def test_derivative_in_the_load_is_infinite_at_zero_load() -> None:
     assert np.isinf(TABLE.gradient(0.3, 0.6, 0.0)[2])
 
 
-def test_outside_domain_nan_spoils_nothing() -> None:
-    """Outside the domain is nan and spoils nothing."""
+def test_outside_the_domain_is_nan_and_spoils_nothing() -> None:
     answer = TABLE.sigma([0.3, 3.01, 0.3, 0.3], [0.6, 0.6, 3.01, 0.6], [0.01, 0.01, 0.01, 0.101])
     assert answer.inside.tolist() == [True, False, False, False]
     assert np.isnan(answer.sigma[1:]).all()
@@ -122,8 +116,7 @@ def test_many_rows_are_answered_as_few_are() -> None:
     assert np.array_equal(single.sigma[:, 1], TABLE.sigma(columns[0], 0.6, 0.02).sigma, equal_nan=True)
 
 
-def test_profile_averages_sigma_exact_off_centre() -> None:
-    """Profile averages to sigma and is exact off centre."""
+def test_profile_averages_to_sigma_and_is_exact_off_centre() -> None:
     x, w = np.polynomial.legendre.leggauss(30)
     for rho, load in ((0.6, 0.05), (2.0, 0.1)):
         r = rho * (x + 1) / 2

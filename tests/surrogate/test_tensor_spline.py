@@ -50,13 +50,9 @@ def test_there_is_no_value_outside(axis: int) -> None:
         assert np.isnan(SPLINE.gradient(*point)).all()
 
 
-def test_table_answers_point_answers_column() -> None:
-    """The table answers a point as it answers a column.
-
-    σ to rounding; the error exactly, at nodes and limits too.
-
-    Not at L's nodes: there the last bit of the cube root decides which of two cells' errors is reported.
-    """
+def test_the_table_answers_a_point_as_it_answers_a_column() -> None:
+    """σ to rounding; the error exactly, at nodes and limits too. Not at L's nodes: there the last bit of the cube root
+    decides which of two cells' errors is reported."""
     limits = [list(limits) for limits in TABLE.domain.values()]
     corners = np.array([*itertools.product(*limits), (3.0, 3.0, 0.1)])
     nodes = np.stack([GENERATOR.choice(axis, 2000) for axis in TABLE.axes[:2]] + [GENERATOR.uniform(0, 0.1, 2000)], 1)

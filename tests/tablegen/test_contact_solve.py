@@ -1,9 +1,5 @@
 """The finite-element contact: the exact linear limit, balance, contact conditions, and increments as the edge moves."""
 
-import csv
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,7 +10,7 @@ from tablegen.contact_column import SphereSolution, press_spheres
 from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
 from tests.support.cases import first
-from tests.support.oracle import NEEDS_ORACLE
+from tests.support.oracle import sphere_rows
 from underskin import SolverError
 
 RHO = np.array([0.0, 0.2, 0.6, 1.0, 3.0])
@@ -27,26 +23,18 @@ def hertz_ratios(sphere: SphereSolution, a: float) -> list[float]:
 
 
 @pytest.mark.slow
-@NEEDS_ORACLE
 @pytest.mark.parametrize("a", first(1, [1.0, 0.05, 0.3, 2.0]))
-def test_small_load_limit_exact_linear_contact(a: float) -> None:
-    """The small load limit is the exact linear contact.
-
-    Two small a/R, extrapolated to 0; force, indentation and stiffness.
-    """
-    with (Path(os.environ["UNDERSKIN_ORACLE"]) / "sphere_on_layer.csv").open(newline="") as file:
-        (row,) = [row for row in csv.DictReader(file) if float(row["a_over_h"]) == a]
-    exact = [float(row[name]) for name in ("force_over_hertz", "indentation_r_over_a2", "stiffness_over_hertz")]
+def test_the_small_load_limit_is_the_exact_linear_contact(a: float) -> None:
+    """Two small a/R, extrapolated to 0; force, indentation and stiffness."""
+    (row,) = [row for row in sphere_rows() if row["a_over_h"] == a]
+    exact = [row[name] for name in ("force_over_hertz", "indentation_r_over_a2", "stiffness_over_hertz")]
     first, second = (np.array(hertz_ratios(s, a)) for s in press_spheres(a, a / np.array([1e-3, 2e-3]), RHO, 5))
     assert 2 * first - second == pytest.approx(exact, rel=2e-4)
 
 
 @pytest.mark.slow
-def test_stress_under_small_contact_exact_layers() -> None:
-    """Stress under a small contact is the exact layers.
-
-    For a/h → 0 the pressure is Hertz's, and its increment that of a flat punch: a point force for the sensors.
-    """
+def test_stress_under_a_small_contact_is_the_exact_layers() -> None:
+    """For a/h → 0 the pressure is Hertz's, and its increment that of a flat punch: a point force for the sensors."""
     (sphere,) = press_spheres(0.02, np.array([20.0]), RHO, 4)
     assert sphere.sigma == pytest.approx(linear_layer.sigma(0.02, RHO), rel=3e-4)
     assert sphere.sigma_increment == pytest.approx(linear_layer.gamma_n(0.0, RHO), rel=1e-3)
@@ -79,13 +67,9 @@ def test_contact_conditions_hold(a: float, radius: float) -> None:
 
 
 @pytest.mark.soak
-def test_increments_slopes_over_neighbours_edges() -> None:
-    """Increments are the slopes over neighbours whose edges differ.
-
-    One sphere at contact edges of 0.85 to 1.15, each on its own mesh: dF/dδ and d(Fσ)/dF at fixed R.
-
-    The table's increments are those slopes in every run (tests/surrogate/test_contact_table.py).
-    """
+def test_increments_are_the_slopes_over_neighbours_whose_edges_differ() -> None:
+    """One sphere at contact edges of 0.85 to 1.15, each on its own mesh: dF/dδ and d(Fσ)/dF at fixed R. The table's
+    increments are those slopes in every run (tests/surrogate/test_contact_table.py)."""
     edges = np.linspace(0.85, 1.15, 7)
     spheres = [press_spheres(a, np.array([4.0]), RHO, 4)[0] for a in edges]
     middle = spheres[3]

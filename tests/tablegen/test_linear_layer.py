@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tablegen import linear_layer
-from tests.support.oracle import NEEDS_ORACLE, linear_layer_values
+from tests.support.oracle import linear_layer_values
 from underskin.physics import half_space
 from underskin.physics.hankel_transform import normal_stress, punch_transform
 
@@ -19,36 +19,26 @@ def test_reference_values() -> None:
     )
 
 
-def test_half_space_error_falls_depth_substrate() -> None:
-    """Half space error falls with the depth of the substrate.
-
-    At (0.289, 0.2) in units of the sensor's depth, with the substrate at the sensor: −34.7 %.
-    """
+def test_half_space_error_falls_with_the_depth_of_the_substrate() -> None:
+    """At (0.289, 0.2) in units of the sensor's depth, with the substrate at the sensor: −34.7 %."""
     error = half_space.sigma(0.289, 0.2) / linear_layer.sigma(0.289, 0.2) - 1
     assert error == pytest.approx(-0.347, abs=5e-4)
 
 
-@NEEDS_ORACLE
 def test_sigma_equals_the_oracle() -> None:
     rho, a, offset, value = linear_layer_values("sigma_hertz")
     assert len(value) > 100
     assert linear_layer.sigma(a, rho, offset) == pytest.approx(value, abs=3e-8)
 
 
-@NEEDS_ORACLE
-def test_influence_point_force_equals_oracle() -> None:
-    """Influence of a point force equals the oracle."""
+def test_influence_of_a_point_force_equals_the_oracle() -> None:
     rho, _, offset, value = linear_layer_values("gamma_n")
     assert len(value) > 10
     assert linear_layer.gamma_n(offset, rho) == pytest.approx(value, abs=3e-8)
 
 
-@NEEDS_ORACLE
-def test_moving_edge_increment_flat_punch() -> None:
-    """The moving edge increment is a flat punch.
-
-    σ + (a/3) ∂σ/∂a equals the stress under the flat punch's pressure (Johnson 1985, section 3.4).
-    """
+def test_the_moving_edge_increment_is_a_flat_punch() -> None:
+    """σ + (a/3) ∂σ/∂a equals the stress under the flat punch's pressure (Johnson 1985, section 3.4)."""
     rho, a, offset, value = linear_layer_values("sigma_edge")
     punch = normal_stress(linear_layer.transmission, punch_transform, a, rho, offset)
     assert punch == pytest.approx(value, abs=3e-8)

@@ -16,8 +16,7 @@ def full(components: np.ndarray) -> np.ndarray:
     return np.array([[rr, rz, 0], [zr, zz, 0], [0, 0, tt]])
 
 
-def test_volume_cofactor_matrix() -> None:
-    """Volume and cofactor are those of the matrix."""
+def test_volume_and_cofactor_are_those_of_the_matrix() -> None:
     for f in F:
         matrix = full(f)
         assert volume_ratio(f) == pytest.approx(np.linalg.det(matrix), rel=1e-12)
@@ -30,8 +29,7 @@ def energy(f: np.ndarray, p: np.ndarray, c2: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("c2", [0.0, 3.0])
-def test_stress_derivative_energy_tangent_stress(c2: float) -> None:
-    """Stress is the derivative of the energy and tangent that of the stress."""
+def test_stress_is_the_derivative_of_the_energy_and_tangent_that_of_the_stress(c2: float) -> None:
     step = 1e-6
     for i in range(5):
         moved = np.zeros(5)
@@ -42,8 +40,7 @@ def test_stress_derivative_energy_tangent_stress(c2: float) -> None:
         assert tangent(F, P, c2)[..., i] == pytest.approx(slopes, rel=1e-5, abs=1e-5)
 
 
-def test_no_stress_rest_young_s_modulus_three() -> None:
-    """No stress at rest and young s modulus is three."""
+def test_no_stress_at_rest_and_youngs_modulus_is_three() -> None:
     assert stress(IDENTITY, np.zeros(())) == pytest.approx(np.zeros(5), abs=1e-15)
     strain = 1e-6  # axial strain e, lateral −e/2, no lateral stress
     f = IDENTITY + strain * np.array([-0.5, 0, 0, 1, -0.5])

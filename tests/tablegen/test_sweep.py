@@ -61,11 +61,8 @@ def _order(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_killed_moment_resumes_table_cluster(tmp_path: Path) -> None:
-    """Killed at any moment it resumes to the table that a cluster makes.
-
-    Killed as a piece is begun or finished on the disk; a piece that was cut there is solved again.
-    """
+def test_killed_at_any_moment_it_resumes_to_the_table_that_a_cluster_makes(tmp_path: Path) -> None:
+    """Killed as a piece is begun or finished on the disk; a piece that was cut there is solved again."""
     with local_cluster() as cluster:
         make_sigma_table(tmp_path / "cluster.h5", SMALL, scheduler=cluster.scheduler_address)
     path, script = tmp_path / "sigma.h5", tmp_path / "make.py"

@@ -35,11 +35,8 @@ def test_linear_limit_is_the_exact_layer(a: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("order", [3, 4])
-def test_convergence_rate_stress_base(order: int) -> None:
-    """Convergence rate of the stress on the base.
-
-    Stresses of elements of order k converge like h^k in the mean square, here on the base under a wide contact.
-    """
+def test_convergence_rate_of_the_stress_on_the_base(order: int) -> None:
+    """Stresses of elements of order k converge like h^k in the mean square, here on the base under a wide contact."""
     errors = []
     for refinement in (1, 2):
         layer = NonlinearLayer(discretise(layer_mesh(1.0, refinement), order))
@@ -61,8 +58,7 @@ def test_finite_strain_reference_values() -> None:
 
 
 @pytest.mark.slow
-def test_volume_kept_path_loading_not_matter() -> None:
-    """Volume is kept and the path of loading does not matter."""
+def test_volume_is_kept_and_the_path_of_loading_does_not_matter() -> None:
     layer = NonlinearLayer(discretise(layer_mesh(0.5), 4))
     load = hertz_load(layer.discretisation, 0.5)
     peak = float(peak_pressures(np.cbrt(np.array([0.1])))[0])
@@ -73,8 +69,8 @@ def test_volume_kept_path_loading_not_matter() -> None:
     assert back.displacement == pytest.approx(direct.displacement, abs=2e-8)
 
 
-def test_surface_sinks_under_contact_base() -> None:
-    """The surface sinks under the contact and the base does not move."""
+@pytest.mark.slow
+def test_the_surface_sinks_under_the_contact_and_the_base_does_not_move() -> None:
     d = discretise(layer_mesh(0.5), 4)
     layer = NonlinearLayer(d)
     state = layer.equilibrium(layer.rest(), 0.3 * hertz_load(d, 0.5))
@@ -126,11 +122,9 @@ def after_newton_step(layer: NonlinearLayer, state: State, load: Floats) -> Stat
     return State(displacement, state.pressure + step[d.free.size :].reshape(state.pressure.shape))
 
 
-def test_change_grows_like_cube_root_load() -> None:
-    """Change grows like the cube root of the load.
-
-    σ(L) − σ(0) ∝ L^(1/3) as L → 0, so that the table's axis is smooth.
-    """
+@pytest.mark.slow
+def test_change_grows_like_the_cube_root_of_the_load() -> None:
+    """σ(L) − σ(0) ∝ L^(1/3) as L → 0, so that the table's axis is smooth."""
     column = solve_column(0.5, nodes(1e-6, 8e-6), order=4)
     assert column.sigma_change[3, 2] / column.sigma_change[3, 1] == pytest.approx(2.0, rel=0.01)
 

@@ -70,7 +70,8 @@ def diagnose_together(
     Parameters
     ----------
     campaigns
-        At least two. Without FRFs their curves are diagnosed as those of one campaign.
+        At least two. Parts of one, such as a file for each sensor or press, are diagnosed as one campaign, and so are
+        curves without FRFs.
     name
         The campaigns' common name in the report.
 

@@ -52,7 +52,7 @@ from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
 _OF_CURVES: tuple[Kind, ...] = ("indentation", "compression")  # the first one present gives the verdict without FRFs
-_LEAST_RECORDINGS = 3  # FRFs: of two, d33 absorbs what is common, and the scatter of gain the difference
+LEAST_RECORDINGS = 3  # FRFs: of two, d33 absorbs what is common, and the scatter of gain the difference
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
@@ -207,14 +207,14 @@ def _complete(partial: DiagnosisResult, together: KindsTogether, run: _Run) -> D
     floor = largest_floor_percent(problem, null, groups)
     if leader.explanation is null and floor > _LARGEST_FLOOR:
         return replace(partial, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
-    if leader.explanation is null and problem.kind == "frf" and problem.lines.recordings < _LEAST_RECORDINGS:
-        few = {"recordings": problem.lines.recordings, "least": _LEAST_RECORDINGS}
+    if leader.explanation is null and problem.kind == "frf" and problem.lines.recordings < LEAST_RECORDINGS:
+        few = {"recordings": problem.lines.recordings, "least": LEAST_RECORDINGS}
         return replace(partial, lacking=Lacking(Lack.FEW_TO_AGREE, few), few=result, problem=problem)
     undescribed = leader.explanation is None and result.law is None
     partial = partial.with_findings(*_scatter_findings(problem, stated))
     partial = partial.with_findings(*(nearest_law_findings(problem, result, null) if undescribed else ()))
     if leader.explanation is not None:
-        partial = partial.with_findings(*curve_spread_findings(problem, stated))
+        partial = partial.with_findings(*curve_spread_findings(problem, stated, null))
     return replace(
         partial.with_findings(*above_noise(problem, stated, groups)),
         search=result,

@@ -34,6 +34,7 @@ from underskin.findings.sentences import (
     parameter_at_bound,
     sensor_alone,
     sensor_behind_filter,
+    specimens_differ,
     thickness_differs,
     thickness_unknown,
 )
@@ -293,6 +294,11 @@ ENGLISH: Mapping[Reason, Words] = {
     f"{_CHANGES}",
     Reason.GAIN_DRIFTS: "the charge per force changes within the recording, from {lowest:.2f} to {highest:.2f} times "
     f"its mean{_CHANGES}",
+    Reason.GAIN_OVER_FREQUENCY: "{is_step:between|from} {low_hz:.4g} {is_step:and|to} {high_hz:.4g} Hz the charge per "
+    "force {is_step:{rises:rises|falls} by a factor of {factor:.3g}, and is level on either side|has two levels, a "
+    "factor of {factor:.3g} apart}: another range of the amplifier, a loose plug, or a resonance narrower than the "
+    "lines are apart{left_out:; left out|, and which level is right shows in no recording: no d33 is to be quoted}"
+    "{more:more recording}",
     Reason.WARM_UP: "the response drifts by {percent:+z.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: f"{_ALL_AS_IN}its mean is {{force_mean_n:.3g}} N, and that of charge_pc "
@@ -366,6 +372,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.SCATTER_AT_LIMIT: "the gain of the recordings scatters by {percent:.2g} % or more, the most that is "
     "considered: something other than d33 decides what they read, and the array has no d33 to quote",
     Reason.CURVES_DIFFER: curves_differ,
+    Reason.SPECIMENS_DIFFER: specimens_differ,
     Reason.CURVE_STANDS_OFF: "its modulus is {factor:.2f} times that of the others, which differ by {others:.2g} % "
     "(sd): the gain of a rig scatters so once in {once:.0f}{radius_mm:, and a sphere of {radius_mm:.3g} mm would "
     "agree|}; look at what is declared of it, and repeat it",

@@ -153,14 +153,25 @@ def thickness_differs(
 
 def curves_differ(ids: Sequence[str], factors: Sequence[float], remedies: Sequence[str]) -> str:
     """Curves whose moduli contradict each other."""
-    each = ", ".join(f"{name} {factor:.2f}" for name, factor in zip(ids[:_MOST_CURVES], factors, strict=False))
-    more = " …" if len(ids) > _MOST_CURVES else ""
     why = (
         f"they agree if {' or if '.join(remedies)}"
         if remedies
         else "the sample differs from place to place, or a radius, a size or a range is not what is declared"
     )
-    return f"the moduli of the curves differ by more than a poor rig scatters (times their mean: {each}{more}): {why}"
+    return f"the moduli of the curves differ by more than a poor rig scatters ({_times_mean(ids, factors)}): {why}"
+
+
+def specimens_differ(ids: Sequence[str], factors: Sequence[float]) -> str:
+    """Blocks of several shapes whose moduli differ as specimens may, and as held ends make them."""
+    return (
+        f"the moduli of the blocks differ ({_times_mean(ids, factors)}): specimens of one elastomer may, and platens "
+        "that hold the ends raise those of the flatter ones: press samples of three heights, or oil the ends"
+    )
+
+
+def _times_mean(ids: Sequence[str], factors: Sequence[float]) -> str:
+    each = ", ".join(f"{name} {factor:.2f}" for name, factor in zip(ids[:_MOST_CURVES], factors, strict=False))
+    return f"times their mean: {each}{' …' if len(ids) > _MOST_CURVES else ''}"
 
 
 def more_alike(count: int, noun: str) -> str:

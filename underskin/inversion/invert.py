@@ -70,7 +70,7 @@ from underskin.recordings.frf.flat_zone import (
     without_chain_phase,
 )
 from underskin.recordings.frf.line_choice import excited_at_mains, gain_findings, noise_findings
-from underskin.recordings.frf.series_lines import chosen_lines, of_spoilt
+from underskin.recordings.frf.series_lines import at_two_levels, chosen_lines, of_spoilt
 from underskin.recordings.frf.spectra import Frf, Stack, left_out_of, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
 from underskin.surrogate.off_centre_sigma import positioned_sigma
@@ -130,6 +130,7 @@ def _curvature(residual: Floats, preload: Floats, expected: Floats) -> tuple[flo
     return 1.5 * float(coefficients[2]), float(chance), scatter, freedom
 
 
+_AGAINST_ARRAY = {Reason.TWO_GROUPS, Reason.SCATTER_AT_LIMIT, Reason.GAIN_OVER_FREQUENCY}  # no d33 of the array
 _FAR = 8.0  # deviations
 _LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are considered
 
@@ -375,7 +376,7 @@ class Levels:
 class Inversion:
     """The array's d33. `campaign_d33` (its interval is relative), `spread` (relative, over sensors), `gain` and
     `position` [m] come from the sensors that are neither dead, inverted, weak, strong nor behind a filter of
-    their own; None where there is no such sensor, `campaign_d33` also where the gain scatters up to its limit."""
+    their own; None where there is no such sensor, `campaign_d33` also where it cannot be told."""
 
     sensor_ids: tuple[str, ...]
     recordings: RecordingD33
@@ -551,9 +552,11 @@ def _measured(
         recordings.append(recording)
     chosen, refused = chosen_lines(recordings, Reason.NO_FRF)
     spoilt = {name: why for name, lines in chosen.items() if (why := of_spoilt(name, lines)) is not None}
-    left_out += [*refused, *spoilt.values()]
     chosen = {name: lines for name, lines in chosen.items() if name not in spoilt}
-    findings += excited_at_mains(chosen)
+    of_each, of_levels = at_two_levels(chosen)
+    left_out += [*refused, *spoilt.values(), *of_each.values()]
+    chosen = {name: lines for name, lines in chosen.items() if name not in of_each}
+    findings += [*of_levels, *excited_at_mains(chosen)]
     used = [recording for recording in recordings if recording.id in chosen]
     return [lines.frf for lines in chosen.values()], used, left_out, findings
 
@@ -622,7 +625,7 @@ def _estimated(
         expected = _expected_scatter(model, measured)[plain]
         flags += scatter_flags(ids, sensor[plain], rows, good[plain], pilot, expected)
     of_scatter = _scatter_finding(model) if model else None
-    at_limit = of_scatter is not None and of_scatter.reason is Reason.SCATTER_AT_LIMIT
+    of_array = {finding.reason for finding in (*of_groups, *levels.findings, *([of_scatter] if of_scatter else []))}
     return Inversion(
         sensor_ids=ids,
         recordings=rows,
@@ -633,7 +636,7 @@ def _estimated(
         sensors=sensors,
         flags=tuple(flags),
         zone=levels.zone,
-        campaign_d33=model.mean if model and not of_groups and not at_limit else None,
+        campaign_d33=model.mean if model and of_array.isdisjoint(_AGAINST_ARRAY) else None,
         spread=model.spread if model and not of_groups and len(set(sensor[plain])) > 1 else None,
         gain=model.gain if model else None,
         position=model.position if model else None,

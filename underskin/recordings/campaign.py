@@ -11,7 +11,7 @@ stars. `units_checked` does not admit them.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, asdict, dataclass, fields, replace
 from datetime import datetime
 from functools import cache
@@ -33,15 +33,15 @@ DEFAULT_KIND = "frf"  # of a recording whose document states none
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor of the array and its centre: x along the skin's length, y along its width."""
+    """A sensor of the array and its centre: x along the skin's length, y along its width; a single one needs none."""
 
     id: field.Name
-    x_mm: field.Number
-    y_mm: field.Number
+    x_mm: field.Number = 0.0
+    y_mm: field.Number = 0.0
 
 
 def read_sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
-    """The sensors of an array, with distinct ids."""
+    """The sensors of an array, with distinct ids, and each with a place where they are several."""
     if not isinstance(value, list | tuple):
         raise wrong_type(name, shown(value), "must be a list of sensors")
     sensors = [field.build(Sensor, f"{name}[{index}]", document, units_checked) for index, document in enumerate(value)]
@@ -50,6 +50,9 @@ def read_sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ..
         if sensor.id in seen:
             raise not_unique(f"{name}[{index}].id", sensor.id, "must differ from every other sensor's")
         seen.add(sensor.id)
+        for axis in ("x_mm", "y_mm") if len(sensors) > 1 or len(value[index]) > 1 else ():
+            if value[index].get(axis) is None:
+                raise errors.required(f"{name}[{index}].{axis}", "required, but of a skin's only sensor")
     return tuple(sensors)
 
 
@@ -220,7 +223,6 @@ class CompressionConditions(_OfAKind):
 CurveConditions = IndentationConditions | CompressionConditions
 RecordingConditions = FrfConditions | IndentationConditions | CompressionConditions
 
-
 _Kind = TypeVar("_Kind")
 
 
@@ -329,9 +331,8 @@ def _rows(columns: Mapping[str, ArrayLike]) -> list[dict[str, Any]]:
         raise InvalidInput(
             "columns", lengths, "must have one length, or be single numbers", code=ErrorCode.UNEQUAL_LENGTHS
         ) from None
-    return [
-        dict(zip(columns, row, strict=True)) for row in zip(*(column.tolist() for column in broadcast), strict=True)
-    ]
+    rows = zip(*(column.tolist() for column in broadcast), strict=True)
+    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def frf_of(conditions: Conditions) -> list[FrfConditions]:
@@ -431,8 +432,7 @@ def _bounded(model: Any) -> tuple[str, ...]:
 
 
 def _largest(value: Any) -> float:
-    """The largest finite magnitude of a column, a position, the sensors' positions, or a lab's own columns; 0 if
-    none."""
+    """The largest finite magnitude of a column, of positions, or of a lab's own columns; 0 if none."""
     if isinstance(value, dict):
         value = [number for number in value.values() if not isinstance(number, str)]
     elif isinstance(value, tuple) and value and isinstance(value[0], Sensor):
@@ -440,14 +440,13 @@ def _largest(value: Any) -> float:
     if value is None or np.size(value) == 0:
         return 0.0
     size = np.abs(np.asarray(value, dtype=float))
-    return float(np.max(size, initial=0.0, where=np.isfinite(size)))
+    return float(size.max(initial=0.0, where=np.isfinite(size)))
 
 
 def refusals(model: Any) -> list[InvalidInput]:
     """The errors of a model: numbers out of bounds, and times outside the years that every time zone has."""
     refused = [excess.error for excess in excesses(model) if not excess.is_faint]
-    written = getattr(model, "recorded_at", None)
-    first, last = _YEARS
+    written, (first, last) = getattr(model, "recorded_at", None), _YEARS
     if written is not None and not first <= datetime.fromisoformat(written).year <= last:
         allowed = f"must be in the years {first} to {last}: leave it out where the clock was not set"
         refused.append(out_of_range("recorded_at", written, allowed))
@@ -589,6 +588,7 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     recording_documents = document.get("recordings")
     if not isinstance(recording_documents, list) or not recording_documents:
         raise errors.wrong_type("recordings", shown(recording_documents), "must be a list of at least one recording")
+    skin = skin if skin.sensors else replace(skin, sensors=_single_sensor(recording_documents))
     field.counted_alike([sensor.id for sensor in skin.sensors], recording_documents)
     good: dict[str, Recording] = {}
     problems: list[RecordingProblem] = []
@@ -603,6 +603,12 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     if not good and all(problem.field.startswith("skin.") for problem in problems):
         raise problems[0].as_error(problems[0].field)
     return Campaign(name, skin, tuple(good.values()), units_checked), problems
+
+
+def _single_sensor(recordings: Sequence[Any]) -> Sensors:
+    """The sensor that recordings name, where they name one."""
+    named = {one["sensor"] for one in recordings if isinstance(one, Mapping) and isinstance(one.get("sensor"), str)}
+    return read_sensors("skin.sensors", [{"id": name} for name in named], False) if len(named) == 1 else ()
 
 
 def parse(document: Any) -> Campaign:

@@ -52,7 +52,7 @@ def text_left_out(name: str, example: str) -> str:
     return f"column {name!r} holds text, such as {example[:_SHOWN]!r}, and is left out"
 
 
-_SHOWN = 30  # letters of a cell in a message
+_SHOWN, _NAMED = 30, 5  # letters of a cell, and names, in a message
 _Column = TypeVar("_Column", Channel, TextColumn)
 
 
@@ -144,6 +144,12 @@ def _by_block(name: str, table: Contents) -> Iterator[tuple[str, str | float]]:
     for key, value in table.properties.items():
         about = [f"{name} {key}"] if numbered and key.startswith(numbered) else [f"{block}.{key}" for block in blocks]
         yield from ((by_block, value) for by_block in about)
+
+
+def some_of(names: Sequence[str]) -> str:
+    """The first of many names, with the count of the others."""
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return ", ".join(names[:_NAMED]) + more
 
 
 def with_distinct_names(channels: list[Channel]) -> tuple[Channel, ...]:

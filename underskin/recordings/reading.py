@@ -20,10 +20,12 @@ import numpy as np
 import orjson
 
 from underskin.errors import FileError, InvalidInput, conflicting, too_few
+from underskin.findings.formatting import few
 from underskin.recordings import curve_preparation, joined_files, rig_description, rig_guess, rig_mapping, validation
 from underskin.recordings.campaign import (
     COLUMNS,
     Campaign,
+    CompressionRecording,
     Recording,
     RecordingProblem,
     SkinDescription,
@@ -224,6 +226,7 @@ def _opened(source: Path | str | bytes, name: str) -> Iterator[BinaryIO]:
 
 _ROUNDING = 1e-6  # relative, and of positions [mm]: single precision, and conversions of units
 _MOST_LISTED = 5  # repeats in a warning
+_APART_MM = 100.0  # beyond what any layer of a skin transmits
 _INDEX_LABEL = "recordings["  # how a refused recording without an id is named
 
 Files = Sequence[tuple[str, Reading]]  # name and content of each file
@@ -232,14 +235,15 @@ Files = Sequence[tuple[str, Reading]]  # name and content of each file
 def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
     """One campaign called `name` of the recordings of all files, in order.
 
-    The files must be of one skin: stated facts must agree, and the sensors are those of all files. `skin_id` replaces
-    the ids in the files. An id used by several files is preceded by the file's name. Of identical recordings (`digest`)
-    only the first is kept, and a warning names the others. Raises InvalidInput that names the field and the two files
-    where they differ.
+    The files must be of one skin: stated facts must agree, and the sensors are those of all files; where each has one,
+    at the origin, they are put apart, and a warning says so. `skin_id` replaces the ids in the files. An id used by
+    several files is preceded by the file's name. Of identical recordings (`digest`) only the first is kept, and a
+    warning names the others. Raises InvalidInput that names the field and the two files where they differ.
     """
     name = validation.name("name", name, False)
     if not files:
         raise too_few("files", "none", "must be at least one")
+    files, of_places = _put_apart(files)
     skin = _skin(files, skin_id)
     names = _names(files)
     recordings, repeats = _once(
@@ -255,8 +259,39 @@ def join(name: str, files: Files, skin_id: str | None = None) -> Reading:
         for problem in reading.problems
     ]
     units_checked = any(reading.campaign.units_checked for _, reading in files)
-    warnings = [*_warnings(files), *_renamed(files, names), *_repeated(repeats)]
+    warnings = [*_warnings(files), *of_places, *_renamed(files, names), *_repeated(repeats)]
     return Reading(Campaign(name, skin, tuple(recordings), units_checked), problems, warnings)
+
+
+def _put_apart(files: Files) -> tuple[Files, list[str]]:
+    """The files; where several have a single sensor each, at the origin, their places among each other are not known,
+    and they are put apart, with a warning."""
+    skins = [reading.campaign.skin.sensors for _, reading in files]
+    in_arrays = {sensor.id for sensors in skins for sensor in sensors if len(sensors) > 1}
+    single = [sensors[0] for sensors in skins if len(sensors) == 1]
+    at_origin = [sensor.id for sensor in single if not (sensor.x_mm or sensor.y_mm or sensor.id in in_arrays)]
+    places = {name: number * _APART_MM for number, name in enumerate(dict.fromkeys(at_origin))}
+    if len(places) < 2:
+        return files, []
+    listed = few(list(places), _MOST_LISTED)
+    warning = f"each of {listed} lies at x 0 mm, y 0 mm in its file: they are taken to be far from each other"
+    return [(file, _moved(reading, places)) for file, reading in files], [warning]
+
+
+def _moved(reading: Reading, places: Mapping[str, float]) -> Reading:
+    """The reading with its single sensor, and what is pressed beside it, moved along x to its place [mm]."""
+    campaign = reading.campaign
+    if len(campaign.skin.sensors) != 1 or campaign.skin.sensors[0].id not in places:
+        return reading
+    x = places[campaign.skin.sensors[0].id]
+    recordings = [
+        replace(recording, position_mm=(recording.position_mm[0] + x, recording.position_mm[1]))
+        if not isinstance(recording, CompressionRecording) and recording.position_mm is not None
+        else recording
+        for recording in campaign.recordings
+    ]
+    skin = replace(campaign.skin, sensors=(replace(campaign.skin.sensors[0], x_mm=x),))
+    return replace(reading, campaign=replace(campaign, skin=skin, recordings=tuple(recordings)))
 
 
 def _skin(files: Files, skin_id: str | None) -> SkinDescription:

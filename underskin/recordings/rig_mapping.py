@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from underskin.errors import FileError, Mention, Requirement
+from underskin.recordings import tension
 from underskin.recordings.campaign import KINDS, SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values, text_left_out
 from underskin.recordings.curve_preparation import falling
@@ -120,8 +121,12 @@ class MappedBlock:
         columns = {field: self._tared(field, column) for field, column in columns.items()}
         columns = self._without_instrument(columns)
         self._say_ranges(columns)
-        self._require_stated_sign(columns)
-        return self._of_kind(columns) | ({"signs_checked": True} if self.rig.has_stated_signs else {})
+        if self.rig.is_pulled:
+            columns = tension.turned(columns, signs_stated=self.rig.has_stated_signs)
+        else:
+            self._require_stated_sign(columns)
+        signs_checked = self.rig.is_pulled or self.rig.has_stated_signs
+        return self._of_kind(columns) | ({"signs_checked": True} if signs_checked else {})
 
     def _of_kind(self, columns: dict[str, Any]) -> dict[str, Any]:
         """Curves with the times that the sample rate gives."""
@@ -179,20 +184,23 @@ class MappedBlock:
         values = {}
         for field, value in self.rig.recording.items():
             try:
-                values[field] = common_value(field, self.row_value(field, value), self.stated, self.file)
+                values[field] = self._common_value(field, value)
             except UnreadableTime as error:
                 self.warnings.append(str(error))
-        return values
+        return tension.of_sample(values, self.file) if self.rig.is_pulled else values
 
-    def row_value(self, field: str, value: Any) -> Any:
-        """The value of a field that a column holds in all rows of this recording, in the field's unit; of lists and
-        mappings of each part; others as they are."""
+    def _common_value(self, field: str, value: Any) -> Any:
+        """The value of a field in its unit; of lists and mappings of each part."""
         if isinstance(value, list):
-            return [self.row_value(axis, part) for axis, part in zip(AXES, value, strict=False)]
+            return [self._common_value(axis, part) for axis, part in zip(AXES, value, strict=False)]
         if isinstance(value, Mapping):
-            return {name: self.row_value(name, part) for name, part in value.items()}
-        if not isinstance(value, SignalMapping):
-            return value
+            return {name: self._common_value(name, part) for name, part in value.items()}
+        if isinstance(value, SignalMapping):
+            return self._row_value(field, value)
+        return common_value(field, value, self.stated, self.file)
+
+    def _row_value(self, field: str, value: SignalMapping) -> Any:
+        """The value of a field that a column holds in all rows of this recording, in the field's unit."""
         words = self.block.words(value.channel)
         if words is not None:
             text = words.texts[words.codes[0]]

@@ -20,7 +20,7 @@ import numpy as np
 import orjson
 
 from underskin.errors import FileError
-from underskin.recordings.readers import hdf5_file
+from underskin.recordings.readers import hdf5_guard
 from underskin.recordings.readers.hdf5_file import MAGIC
 from underskin.recordings.readers.parsing_limits import ParsingLimits
 from underskin.recordings.readers.sandbox import call_apart
@@ -117,7 +117,7 @@ def _is_export(stream: BinaryIO) -> dict[str, Any]:
         with h5py.File(stream, "r") as source:
             return {"is_export": str(source.attrs.get("schema")).startswith(_ANY_SCHEMA)}
     except OSError as error:
-        raise FileError("", "", hdf5_file.damage(error)) from None
+        raise FileError("", "", hdf5_guard.damage(error)) from None
 
 
 def _overview(stream: BinaryIO) -> dict[str, Any]:
@@ -134,7 +134,7 @@ def _campaigns(stream: BinaryIO, names: str) -> dict[str, Any]:
 
 @contextmanager
 def _opened(stream: BinaryIO) -> Iterator[Any]:
-    with hdf5_file.opened(stream, "", "the export") as source:
+    with hdf5_guard.opened(stream, "", "the export") as source:
         schema = str(source.attrs.get("schema"))
         if schema.startswith(_ANY_SCHEMA) and schema != SCHEMA:
             raise FileError("", "/", f"is an export of another underskin: {schema}; this one reads {SCHEMA}")

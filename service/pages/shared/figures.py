@@ -1,31 +1,32 @@
-"""A plotly figure in a page: its JSON, its description, and the address of its numbers."""
+"""A plotly figure in a page: its JSON, its description, and the address of its numbers; FRFs, curves and histories."""
 
-import re
-import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal
 from urllib.parse import quote
 
 import numpy as np
 import orjson
-from fastapi import Response
+import plotly.graph_objects as go
 from markupsafe import Markup
 
 from service.pages.shared.assets import LIBRARY, gzipped
 from service.pages.shared.formats import json_inside
+from service.schemas.skins import History, SensorDeparture, SensorHistory
 from service.store import AnyRow
-from underskin.prediction.columns import to_spreadsheet
-from underskin.recordings.campaign import CurveRecording, FrfRecording, Recording
+from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
+from underskin.diagnosis.reporting.page_styles import with_minus
+from underskin.figures.curves import ForceCurve, force_curves
+from underskin.figures.frf import frf_overview, frf_recordings
+from underskin.figures.history import SensorPoints, d33_history, is_summarised
+from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, Recording
+from underskin.recordings.frf import thinned_lines
 from underskin.units import Floats
 
-if TYPE_CHECKING:
-    import plotly.graph_objects as go
-
-_NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
-_LONGEST_PART = 60  # characters, of a name
 CLICK = "Click a sensor to choose it."
+By = Literal["paper", "adopted"]
+RESTS = {"adopted": "by the adopted model", "paper": "by the paper's model"}
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Drawn:
     choices: tuple[str, ...] = ()  # selectable views, the first is the default
 
 
-def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None) -> Drawn:
+def drawn(name: str, figure: go.Figure, about: str, numbers: str | None = None) -> Drawn:
     """For the template's macro `figure`; `about` says what is to be seen."""
     title, height = figure.layout.title.text, figure.layout.height
     return Drawn(name, title, height, json_inside(figure.to_json()), numbers, about)
@@ -49,11 +50,7 @@ def drawn(name: str, figure: "go.Figure", about: str, numbers: str | None = None
 
 @cache
 def prepare() -> None:
-    """Load the plotting code before the first request for a figure: it takes half a second."""
-    import underskin.figures.campaign_figures
-    from underskin.figures.frf import frf_overview
-
-    assert underskin.figures.campaign_figures
+    """Draw something, and compress the script, before the first request for a figure."""
     frf_overview([], None).to_json()
     gzipped(LIBRARY)
 
@@ -68,8 +65,6 @@ def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -
 def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", numbers: str | None = None) -> list[Drawn]:
     """The first curve recordings in one figure, for a single one its loading and unloading; empty if there are none.
     `noun`: their name."""
-    from underskin.figures.curves import ForceCurve, force_curves
-
     chosen = [recording for recording in recordings if not isinstance(recording, FrfRecording)]
     if not chosen:
         return []
@@ -93,42 +88,6 @@ def _there_and_back(curve: CurveRecording) -> list[tuple[str, Floats, Floats]]:
     return [("loading", depth[: turn + 1], force[: turn + 1]), ("way back", depth[turn:], force[turn:])]
 
 
-class CsvAnswer(Response):
-    """Columns as a CSV file to be saved; the columns themselves too, as numbers and texts are one in its text."""
-
-    def __init__(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
-        super().__init__(to_spreadsheet(columns), headers=_saved(f"{name}.csv"), media_type="text/csv; charset=utf-8")
-        self.name, self.columns = name, columns
-
-
-def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> CsvAnswer:
-    """Columns as a CSV file to be saved."""
-    return CsvAnswer(name, columns)
-
-
-def attachment(file: str, content: str | bytes, media_type: str, **headers: str) -> Response:
-    """A file to be saved."""
-    return Response(content, headers=_saved(file) | headers, media_type=media_type)
-
-
-def file_name(*parts: str) -> str:
-    """A file name made of skin, campaign and so on, without characters that file systems reject."""
-    plain = (_NOT_IN_NAMES.sub("-", part)[:_LONGEST_PART].strip("-.") for part in parts)
-    return "-".join(part for part in plain if part)
-
-
-def _saved(file: str) -> dict[str, str]:
-    """Headers of a file to be saved; a name beyond ASCII also as RFC 6266 has it."""
-    plain = unicodedata.normalize("NFKD", file).encode("ascii", "ignore").decode()
-    disposition = f'attachment; filename="{plain}"' + ("" if plain == file else f"; filename*=UTF-8''{quote(file)}")
-    return {"Content-Disposition": disposition, "X-Content-Type-Options": "nosniff"}
-
-
-def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> CsvAnswer:
-    """Rows as a CSV file of these columns; a cell is NaN where a row lacks it."""
-    return csv_answer(name, dict(zip(names, columns_of(rows, *names), strict=True)))
-
-
 def columns_of(rows: Sequence[Mapping[str, Any]], *names: str) -> list[list[Any]]:
     """Columns of rows; None where a row lacks it."""
     return [[row.get(name) for row in rows] for name in names]
@@ -145,3 +104,89 @@ def sensors_of(row: AnyRow, answer: Mapping[str, Any]) -> list[dict[str, Any]]:
         }
         for of_sensor in answer["sensors"]
     ]
+
+
+def drawn_frf(
+    row: AnyRow,
+    loaded: Callable[[], Campaign],
+    answer: Mapping[str, Any],
+    stored_spreads: Sequence[Mapping[str, Any]] | None,
+    show: str,
+) -> list[Drawn]:
+    """Empty where no recording is shown. `loaded`: the campaign with all numbers; `answer`: its d33; `stored_spreads`:
+    those of its conditions, if stored; `show`: a sensor or a recording, empty for all."""
+    band = answer["band"]
+    zone = None if band is None else (band["low_hz"], band["high_hz"])
+    page = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
+    if show or stored_spreads is None:
+        chosen = measured(loaded(), show)
+        if not chosen:
+            return []
+        if len(chosen) <= MOST_SINGLE:
+            lines = [thinned_lines.lines_of(_title(recording, show), frf) for recording, frf in chosen]
+            conditions = _conditions([recording for recording, _ in chosen])
+            about = "Magnitude, phase and coherence of each recording; R is the sphere's radius."
+            about += " Colours tell preloads apart, marks along the lines spheres." if conditions else ""
+            return [drawn("frf", frf_recordings(lines, zone, conditions), about, page)]
+        summaries = spreads_of(chosen)
+    else:
+        summaries = spreads(stored_spreads)
+    count = sum(spread.recordings for spread in summaries)
+    about = (
+        f"{count} recordings: for each sphere and preload the median magnitude "
+        "and phase and the lowest coherence; as a band, the magnitudes of all its recordings. R is the sphere's radius."
+    )
+    return [drawn("frf", frf_overview(summaries, zone), about, page)]
+
+
+def _conditions(recordings: Sequence[FrfRecording]) -> list[tuple[float, float]]:
+    """Sphere [mm] and preload [N] of each recording, where these are of one sensor under several loads."""
+    conditions = [(recording.indenter_radius_mm, recording.preload_n) for recording in recordings]
+    of_one_sensor = len({recording.sensor for recording in recordings}) == 1
+    return conditions if of_one_sensor and len(set(conditions)) > 1 else []
+
+
+def _title(recording: FrfRecording, show: str) -> str:
+    where = "" if show == recording.sensor else f"{recording.sensor}, "
+    return f"{where}R {recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
+
+
+def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Drawn:
+    """d33 over time: of one sensor, of all, or of many the median and the range."""
+    numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
+    points = [
+        SensorPoints(
+            sensor_history.sensor,
+            [point.time for point in sensor_history.points],
+            [point.d33_pc_per_n for point in sensor_history.points],
+            [point.d33_uncertainty_pc_per_n for point in sensor_history.points],
+            _trend_in_words(sensor_history),
+        )
+        for sensor_history in history.sensors
+    ]
+    whose = "each sensor" if sensor is None else sensor
+    about = f"d33 of {whose} in every campaign, {RESTS[by]}, with its 95 % interval."
+    if is_summarised(len(points), sum(len(sensor_history.times) for sensor_history in points)):
+        about = (
+            f"Median d33 over the sensors in each campaign, {RESTS[by]}, the range of 90 % of them, and by name those "
+            f"that stand apart{'' if sensor is None else f'; the line is {sensor}'}. Point at a sensor for its line."
+        )
+    return drawn("history", d33_history(points, sensor), about, numbers)
+
+
+def _trend_in_words(sensor: SensorHistory) -> str:
+    """The trend of the sensor's d33, relative to the array's if there are enough sensors."""
+    if sensor.departure is not None:
+        return with_minus(_besides(sensor.departure))
+    line = sensor.trend
+    if line is None:
+        return f"no trend: {sensor.no_trend}"
+    slope = f"{line.slope_pc_per_n_per_year:+.2g} ± {line.slope_uncertainty_pc_per_n_per_year:.1g} pC/N a year"
+    slope = with_minus(slope)
+    return slope if line.significant else f"no significant trend ({slope})"
+
+
+def _besides(departure: SensorDeparture) -> str:
+    low, high = departure.change_low_percent, departure.change_high_percent
+    size = f"{departure.change_percent:+z.1f} % ({low:+z.1f} to {high:+z.1f})"
+    return f"besides the array {size}" if departure.significant else f"as the array does, within chance: {size}"

@@ -1,7 +1,8 @@
-"""Numbers, times and words as pages show them: short, with the exact value as tooltip."""
+"""Numbers, times, words and noted conditions as pages show them: short, with the exact value as tooltip."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime, time
 from typing import Any
 
@@ -13,8 +14,12 @@ from underskin.findings.formatting import in_digits, in_percent, significant
 from underskin.recordings.readers.text import in_lab
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
-
 _LOPSIDED = 1.1  # how many times as far up as down: less is not seen in the digits of an interval
+
+_RECORDINGS = {"frf": "FRFs", "indentation": "indentation curves", "compression": "compression or tension curves"}
+_KIND = {"frf": "FRF", "compression": "compression or tension"}
+Noted = Mapping[str, float | str]
+_MOST_CONDITIONS = 8  # columns
 
 
 def number(value: float | None, unit: str = "", digits: int = 3) -> Markup:
@@ -125,10 +130,6 @@ def capitalize_first(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-_RECORDINGS = {"frf": "FRFs", "indentation": "indentation curves", "compression": "compression or tension curves"}
-_KIND = {"frf": "FRF", "compression": "compression or tension"}
-
-
 def recordings(kinds: Sequence[str]) -> str:
     """Kinds of recordings in words."""
     return ", ".join(_RECORDINGS.get(kind, kind) for kind in kinds)
@@ -145,3 +146,29 @@ FILTERS: Mapping[str, Callable[..., Any]] = {
     "capitalize_first": capitalize_first, "limit": limit, "recordings": recordings, "reaches_up": reaches_up,
     "in_readable_units": in_readable_units, "kind": kind,
 }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ConditionColumn:
+    """A name, and whether all that was noted under it are numbers."""
+
+    name: str
+    numeric: bool
+
+
+@dataclass(frozen=True)
+class ConditionColumns:
+    """The shown columns, and the names of those without room."""
+
+    shown: Sequence[ConditionColumn]
+    others: Sequence[str]
+
+
+def condition_columns(recordings: Iterable[Noted | None]) -> ConditionColumns:
+    """Every name that any of the recordings has, in the order of their appearance."""
+    numeric: dict[str, bool] = {}
+    for noted in recordings:
+        for name, value in (noted or {}).items():
+            numeric[name] = numeric.get(name, True) and not isinstance(value, str)
+    columns = [ConditionColumn(name, all_numbers) for name, all_numbers in numeric.items()]
+    return ConditionColumns(columns[:_MOST_CONDITIONS], [column.name for column in columns[_MOST_CONDITIONS:]])

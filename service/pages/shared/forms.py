@@ -1,10 +1,12 @@
-"""Forms: read, rejected unless made for this session, and errors in the labels that the reader sees instead of the
-request's field names."""
+"""Forms: read, rejected unless made for this session, and all errors at once in the labels that the reader sees instead
+of the request's field names, with each invalid field marked."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Annotated
+from functools import partial
+from typing import Annotated, Any
 from urllib.parse import parse_qs
 
 from fastapi import Depends, Request
@@ -14,7 +16,7 @@ from service.auth import session
 from service.dependencies import sender
 from service.problems import Refusal
 from service.store import Conflict, Missing
-from service.usecases import annotations
+from service.usecases import changes
 from underskin.errors import (
     UNITS_CHECKED,
     InvalidInput,
@@ -22,12 +24,15 @@ from underskin.errors import (
     Requirement,
     SeveralInvalid,
     UnderskinError,
+    all_of,
+    errors_of,
     noting,
     out_of_range,
     required,
     wrong_type,
 )
 from underskin.recordings.readers import text
+from underskin.recordings.validation import declared, poisson_ratio
 from underskin.units import LAB
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
@@ -49,6 +54,7 @@ _LABELS = {
     "who": "Your name",
     "skin_id": "Id of the other skin",
 }  # of forms that change stored data
+_MOST_LISTED_ERRORS = 20
 
 
 async def _fields(request: Request) -> dict[str, str]:
@@ -69,11 +75,13 @@ async def _fields(request: Request) -> dict[str, str]:
 
 def require_form_token(request: Request, token: str) -> None:
     """Rejects a form that was not sent from a page of this session."""
-    if not session.is_form_token(session.cookie_in(dict(request.scope["headers"])), token):
+    if not session.is_form_token(session.cookie_of(request), token):
         raise Refusal(403, "This form was not made for your session, or the session has ended: go back and reload it.")
 
 
 Form = Annotated[dict[str, str], Depends(_fields)]
+
+
 FORM_OF_SESSION = Depends(_fields)  # of a route that needs no field, only that the form is of this session
 
 
@@ -98,7 +106,7 @@ def signed(request: Request, sent: Mapping[str, str]) -> str | None:
 
 def annotated(sent: Mapping[str, str]) -> dict[str, str | None]:
     """Remark and tags of a form as they are kept, None where empty. Raises InvalidInput."""
-    return {"remark": annotations.remark(sent.get("remark")), "tags": annotations.tags([sent.get("tags", "")])}
+    return {"remark": changes.remark(sent.get("remark")), "tags": changes.tags([sent.get("tags", "")])}
 
 
 def see(path: str) -> RedirectResponse:
@@ -114,6 +122,10 @@ class RefusedForm:
     why: str
     sent: Mapping[str, str]
     status: int
+
+
+NOT_ASKED = Depends(lambda: None)  # of what no address gives, but a form that was rejected and is shown again
+Refused = Annotated[RefusedForm | None, NOT_ASKED]
 
 
 def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> RefusedForm | None:
@@ -173,6 +185,11 @@ def numbers(name: str, line: str, parts: Sequence[str] = ()) -> list[float]:
     return read
 
 
+def labels_of(fields: Iterable[tuple[Any, ...]]) -> dict[str, str]:
+    """The labels of a form, with the unit, from rows that begin with field, words and unit."""
+    return {name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in fields}
+
+
 def in_form_words(
     error: UnderskinError, labels: Mapping[str, str], lines: Sequence[int] = (), unlikely: str = ""
 ) -> str:
@@ -216,3 +233,63 @@ def _load(path: re.Match[str], lines: Sequence[int]) -> str:
         return load
     name = _TANGENTIAL[int(part)] if field == "tangential_force_n" and part is not None else _OF_LOAD.get(field, field)
     return f"{load}, {name}"
+
+
+@dataclass(frozen=True)
+class WrongFields:
+    """Errors in sentences, each with the name of its form field; empty for an error of no field."""
+
+    sentences: Sequence[tuple[str, str]] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.sentences)
+
+    def ids(self, name: str) -> str:
+        """HTML ids of the error sentences of a field, separated by blanks."""
+        return " ".join(f"wrong-{index}" for index, (field, _) in enumerate(self.sentences, 1) if field == name)
+
+
+NOTHING_WRONG = WrongFields()
+
+
+def wrong_fields(
+    error: UnderskinError,
+    in_words: Callable[[UnderskinError], str],
+    field_of: Callable[[InvalidInput], str] = lambda error: error.field,
+) -> WrongFields:
+    """The errors of a form from an exception, each worded by `in_words`, for the field that `field_of` gives."""
+    if not isinstance(error, InvalidInput):
+        return WrongFields([("", in_words(error))])
+    errors = errors_of(error)
+    entries = [(field_of(invalid), in_words(invalid)) for invalid in errors[:_MOST_LISTED_ERRORS]]
+    more = len(errors) - len(entries)
+    return WrongFields([*entries, *([("", f"and {more} more")] if more else [])])
+
+
+@contextmanager
+def errors_together(order: Sequence[str] = ()) -> Iterator[list[InvalidInput]]:
+    """Collects errors through `noting`; after the block raises SeveralInvalid with the first error of each place,
+    because an unreadable value fails later checks too. `order`: the order of the fields in the form, if checks have
+    another."""
+    wrong: list[InvalidInput] = []
+    with noting(wrong):
+        yield wrong
+    first: dict[str, InvalidInput] = {}
+    for invalid in wrong:
+        first.setdefault(invalid.place, invalid)
+    if first:
+        places = {name: index for index, name in enumerate(order)}
+        raise SeveralInvalid(sorted(first.values(), key=lambda invalid: places.get(invalid.field, len(places))))
+
+
+def quantity(name: str, typed: str, *, units_checked: bool = False) -> float:
+    """A typed number, checked against the range of its field. Raises InvalidInput."""
+    value = number(name, typed)
+    if name == "poisson_ratio":
+        return poisson_ratio(name, value, units_checked)
+    return declared(name, value, units_checked) if name in LAB else value
+
+
+def quantities(typed: Mapping[str, str], names: Iterable[str], *, units_checked: bool = False) -> dict[str, float]:
+    """The same of several fields; raises SeveralInvalid with all that is wrong."""
+    return all_of({name: partial(quantity, name, typed[name], units_checked=units_checked) for name in names})

@@ -86,7 +86,7 @@ def page(
     request: Request, template: str, *, status: int = 200, cookie: str | None = None, **values: Any
 ) -> HTMLResponse:
     """A template as the answer to a request; `cookie` replaces the session's."""
-    cookie_sent = session.cookie_in(dict(request.scope["headers"]))
+    cookie_sent = session.cookie_of(request)
     current = cookie or cookie_sent or session.anonymous()
     key: Key | None = request.scope["key"]
     viewer = {
@@ -109,6 +109,13 @@ def problem_page(refusal: Refusal, request_id: str) -> Response:
         return RedirectResponse(location, refusal.status)
     text = render("problem.html", refusal=refusal, request_id=request_id, viewer=None)
     return HTMLResponse(text, refusal.status, {**headers(), **refusal.headers})
+
+
+def json_answer(request: Request, content: bytes) -> Response:
+    """JSON for a script of a page."""
+    answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
+    compress(request, answer)
+    return answer
 
 
 def compress(request: Request, answer: Response) -> None:

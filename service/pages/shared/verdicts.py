@@ -1,5 +1,5 @@
 """The result of a diagnosis in the few words of a list: verdict, probability, alternatives. Also the adopted model
-in page headers: what it adds, since when, and d33 by it next to the paper's."""
+in page headers: what it adds, since when, and d33 by it next to the paper's; and what is wrong with an array."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.reporting.headline import first_and_rest
 from underskin.diagnosis.reporting.numbers import is_known
+from underskin.diagnosis.reporting.wording import not_quoted, number
 from underskin.findings.formatting import in_percent
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -26,6 +27,7 @@ _WORDS_OF_VERDICT = {
     "insufficient_data": "nothing can be concluded",
 }
 _BY_A_LAW = "mismatch by a law that nobody listed"
+_MOST_NAMED = 6  # sensors
 
 
 @dataclass(frozen=True)
@@ -114,11 +116,6 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
 
 def _quoted(report: Mapping[str, Any]) -> str:
     """The d33 of a report in words; if it may not be quoted, with the report's reason."""
-    from underskin.diagnosis.reporting.wording import (
-        not_quoted,
-        number,
-    )  # with plotting code, which is slow to import
-
     d33 = report["d33"]
     low, high = number(d33["low"], 3), number(d33["high"], 3)
     if d33.get("quotable", True):
@@ -137,3 +134,16 @@ def answer_by_it(store: Database, table: SigmaTable, row: AnyRow) -> tuple[Mappi
 def change_percent(by_paper: float | None, by_model: float | None) -> float | None:
     """How far d33 by the adopted model lies above the paper's [%]."""
     return None if not by_paper or by_model is None else 100 * (by_model / by_paper - 1)
+
+
+def attention(answer: Mapping[str, Any] | None, campaign: Any | None, dead: Sequence[str] = ()) -> list[str]:
+    """Each problem in a few words, from an answer that is kept and its campaign, if any; `dead`: sensors that are named
+    elsewhere."""
+    sensors = [] if answer is None else [sensor for sensor in answer["sensors"] if sensor["sensor"] not in dead]
+    marked = [f"{sensor['sensor'][:24]} {flag['reason']}" for sensor in sensors for flag in sensor["flags"]]
+    problems = marked[:_MOST_NAMED]
+    if len(marked) > _MOST_NAMED:
+        problems.append(f"and {len(marked) - _MOST_NAMED} more of {len(sensors)} sensors")
+    if campaign is not None and (refused := len(campaign.refused)):
+        problems.append(f"{refused} recording{'s' if refused > 1 else ''} refused")
+    return problems

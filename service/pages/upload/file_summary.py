@@ -1,4 +1,4 @@
-"""Summary of an uploaded file: channels, recordings, errors."""
+"""Summary of an uploaded file: channels, recordings, errors, doubts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,21 +8,69 @@ import numpy as np
 
 from service.ingest.reading import InspectedFile, checked
 from service.ingest.uploads import Upload
-from service.pages.upload import stated_preload
 from service.store.codec import recorded_at
 from underskin import InvalidInput
+from underskin.findings.sentences import more_alike
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, Recording, SkinDescription
 from underskin.recordings.channels import Channel, Contents
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.spectra import mean_of
 from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.regular_samples import even_rate
-from underskin.units import to_lab
+from underskin.units import readable_unit, to_lab
 
+_ALIKE = 0.2  # allowed deviation of the measured preload, relative to the stated one
+_REPORTED_RATIO = 3.0  # times the stated preload: beyond that, the findings of a campaign's d33 say so
+_PARTS, _STEADY = 4, 0.2  # of a recording, in which the means of a static force are alike, as a part of its mean
 MOST_LISTED = 60
 _MOST_CHANNELS = 60
 _LEAST_COHERENCE = 0.5  # of lines at which the charge follows the force
 _MOST_PROPERTIES = 40
 MOST_SENSORS = 300  # listed of a skin
 _MOST_SKINS = 2
+
+
+def measured_otherwise(recording: FrfRecording) -> float | None:
+    """The static force [N] of the recording if it differs from the stated preload; None if they agree, or if the
+    channel has no static force: that of a piezo sensor decays to 0."""
+    force = recording.force_n
+    mean = None if force is None or len(force) < _PARTS else mean_of(force)
+    if force is None or mean is None:
+        return None
+    means = [float(part.mean()) for part in np.array_split(force, _PARTS)]
+    is_steady = max(means) - min(means) <= _STEADY * abs(mean)
+    return abs(mean) if is_steady and abs(abs(mean) / recording.preload_n - 1) > _ALIKE else None
+
+
+def _force_in_words(force_n: float) -> str:
+    """A force in the unit in which it reads well."""
+    unit, count = readable_unit("force_n", force_n)
+    return f"{count * force_n:#.3g} {unit}"
+
+
+def doubts(campaign: Campaign) -> list[str]:
+    """A sentence on the first recording of a campaign whose stated preload differs from the measured one, and how
+    many more there are."""
+    measured = [
+        (recording, mean)
+        for recording in campaign.of(FrfRecording)
+        if (mean := measured_otherwise(recording)) is not None
+    ]
+    doubtful = [
+        (recording, mean)
+        for recording, mean in measured
+        if 1 / _REPORTED_RATIO <= mean / recording.preload_n <= _REPORTED_RATIO
+    ]
+    if not doubtful:
+        return []
+    (first, mean), *further = doubtful
+    which = f"{first.id}: " if len(campaign.recordings) > 1 else ""
+    alike = more_alike(len(further), "recording")
+    words = (
+        f"{which}pressed by {first.preload_n:g} N as stated, but its force is {_force_in_words(mean)} on average"
+        f"{alike}: is this the preload of this recording, and is its force measured from 0?"
+    )
+    return [words]
 
 
 @dataclass(frozen=True)
@@ -212,16 +260,14 @@ def _measured(recording: Recording) -> RecordingSummary:
         size = f"sphere, radius {recording.indenter_radius_mm:g} mm"
         return RecordingSummary(recording.id, recording.kind, recording.sensor, size, len(recording.force_n), None)
     column = recording.force_n if recording.force_n is not None else recording.frequency_hz
-    measured = stated_preload.measured_otherwise(recording)
-    addition = "" if measured is None else f" (its force: {stated_preload.in_words(measured)})"
+    measured = measured_otherwise(recording)
+    addition = "" if measured is None else f" (its force: {_force_in_words(measured)})"
     pressed = f"{recording.preload_n:g} N{addition}, sphere radius {recording.indenter_radius_mm:g} mm"
     points = 0 if column is None else len(column)
     return RecordingSummary(recording.id, recording.kind, recording.sensor, pressed, points, _level(recording))
 
 
 def _level(recording: FrfRecording) -> float | None:
-    from underskin.recordings.frf.estimation import lines_of
-
     try:
         lines = lines_of(recording)
     except InvalidInput:

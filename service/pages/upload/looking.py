@@ -1,27 +1,154 @@
-"""Reading the files of an upload by its rig description and its form, for preview."""
+"""Reading the files of an upload by its rig description and its form, for preview, and storing them or their errors;
+warnings come before, because stored data are never deleted."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
+from urllib.parse import quote
 
+import orjson
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 
-from service.ingest.reading import READING_SLOTS, InspectedFile, look, require_few
+from service.dependencies import sender
+from service.ingest import repeats
+from service.ingest.accept import RIG, IngestOptions, accept, sent_rig, stored_rig
+from service.ingest.reading import READING_SLOTS, InspectedFile, checked, field_error, look, require_few
+from service.ingest.uploads import Upload
 from service.pages.shared.figures import Drawn
-from service.pages.upload import course_figure
-from service.pages.upload.figures import figures
-from service.pages.upload.file_summary import ChannelSummary, FileSummary, RecordingSummary, listed, seen
-from service.pages.upload.keep import counts_pressing_negative, worth_knowing
+from service.pages.shared.forms import signed
+from service.pages.upload.figures import course, figures, with_curves_turned
+from service.pages.upload.file_summary import ChannelSummary, FileSummary, RecordingSummary, doubts, listed, seen
 from service.pages.upload.mapping import CHOICES, mapped_file
-from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
-from service.pages.upload.turned_curves import with_curves_turned
-from service.store import Missing
+from service.pages.upload.pending_uploads import PendingUpload, Remembered
+from service.problems import Refusal
+from service.store import Conflict, Database, Missing, campaigns, skins
+from service.usecases import d33_cache
+from underskin.errors import ErrorCode, FileError, InvalidInput, errors_of
+from underskin.recordings import curve_preparation
 from underskin.recordings.rig_mapping import MappedFile, has_channels
 
+SKIN_FIELD, CORRECTS = "skin", "corrects"
 _Result = TypeVar("_Result")
-
 _WORKBOOK, _OF_TEXT = "XLSX", ", separated by tabs, with decimal points"
+
+
+def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str], store: Database) -> list[str]:
+    """Store the valid campaigns; returns their ids. Errors are shown on the upload's page. A second request stores
+    nothing again."""
+    with pending.lock:
+        if pending.kept_at is not None or pending.is_stale:  # of which the page shows no button to keep it
+            return []
+        together = sent.get("together", "").strip() if sent.get("as") == "one" else None
+        pending.skin = sent.get(SKIN_FIELD, "").strip() or None
+        pending.reason = sent.get("reason", "").strip()
+        pending.who = sent.get("who", "").strip()
+        reason = pending.reason or None if pending.corrects is not None else None
+        try:
+            options = IngestOptions(
+                request.app.state.settings,
+                sender(request),
+                skin=pending.skin,
+                corrects=pending.corrects,
+                reason=reason,
+                together=together,
+                estimator=pending.estimator,
+                turn_curves=pending.turned,
+                use_stored_rig=False,  # exactly the previewed data are stored
+                signed=signed(request, sent) if pending.corrects is not None else None,
+            )
+            with pending.shelf.in_use(pending):
+                answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
+        except (InvalidInput, Conflict, Missing, Refusal) as error:
+            pending.refused = field_errors(error)
+            return []
+        stored = [result for result in answer["campaigns"] if result["id"] is not None]
+        page = f"/campaigns/{stored[0]['id']}"
+        pending.kept_at = page if len(stored) == 1 else f"/skins/{quote(stored[0]['skin_id'], safe='')}"
+        pending.shelf.empty(pending)
+        return [result["id"] for result in stored]
+
+
+def _rig_upload(pending: PendingUpload) -> list[Upload]:
+    """The rig description in use, as a part of the upload."""
+    if pending.rig is None:
+        return []
+    path = pending.folder / RIG
+    path.write_bytes(orjson.dumps(pending.rig.document))
+    return [Upload(path, None, RIG, "", in_form=True)]
+
+
+def field_errors(error: Exception) -> list[dict[str, Any]]:
+    """Errors field by field."""
+    if isinstance(error, InvalidInput):
+        return [
+            field_error(invalid.field, invalid.value, invalid.allowed, invalid.code) for invalid in errors_of(error)
+        ]
+    if isinstance(error, Refusal) and error.errors:
+        return [dict(error_of_field) for error_of_field in error.errors]
+    if isinstance(error, FileError):
+        return [field_error(error.file, None, f"{error.place} {error.reason}".strip(), error.code)]
+    detail = error.detail if isinstance(error, Refusal) else str(error)
+    return [field_error("upload", None, detail, ErrorCode.INVALID_VALUE)]
+
+
+def skin_of(store: Database, corrects: str | None) -> str | None:
+    """The skin of the corrected campaign, on which its correction stays; raises Missing."""
+    if corrects is None:
+        return None
+    return str(store.read(campaigns.find, corrects).skin_id)
+
+
+def take_rig(store: Database, pending: PendingUpload, sent: Upload | None) -> None:
+    """Read the upload by the rig description that was sent or that is stored with its skin; errors of a sent one are
+    shown."""
+    if sent is not None:
+        try:
+            pending.rig, pending.rig_label = sent_rig(sent), sent.label
+        except (FileError, InvalidInput) as error:
+            pending.refused = [{**detail, RIG: sent.label or RIG} for detail in field_errors(error)]
+    elif pending.skin is not None:
+        pending.rig = store.read(stored_rig, pending.skin)
+        origin = store.read(skins.rig_origin, pending.skin)
+        if pending.rig is not None and origin is not None:
+            name = pending.rig.document.get("name")
+            pending.remembered = Remembered(name, origin.created_at, skin=pending.skin, file=origin.file)
+
+
+def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, corrects: str | None) -> list[str]:
+    """Warnings in sentences on the campaigns of one file; `skin_id`: the skin it is sent for, if stated; `corrects`:
+    the campaign that they replace."""
+    store, table = request.app.state.store, request.app.state.table
+    sentences: list[str] = []
+    for in_file in map(checked, look.campaigns):
+        if in_file.campaign is None:
+            continue
+        earlier = store.read(repeats.earlier_campaign, in_file.campaign, skin_id, corrects)
+        if earlier is not None:
+            sentences.append(earlier[0])
+        if store.read(repeats.changes_nothing, in_file.campaign, skin_id, corrects):
+            sentences.append("it says the same as the campaign that it corrects: nothing would change.")
+        stored_skin_id = store.read(repeats.otherwise_named, in_file.campaign, corrects)
+        if stored_skin_id is not None:
+            sentences.append(
+                f"the file names skin {in_file.campaign.skin.id}, not {stored_skin_id}, that of the campaign that it "
+                "corrects: the name below decides."
+            )
+        sentences += [
+            *doubts(in_file.campaign),
+            *d33_cache.foreseen(table, in_file.campaign),
+        ]
+    return sentences
+
+
+def counts_pressing_negative(looked: InspectedFile) -> bool:
+    """Whether curves of a file count pressing negative."""
+    held = [
+        checked_campaign.campaign
+        for checked_campaign in map(checked, looked.campaigns)
+        if checked_campaign.campaign is not None
+    ]
+    return any(curve_preparation.findings(campaign) for campaign in held)
 
 
 async def in_turn(work: Callable[..., _Result], *arguments: Any) -> _Result:
@@ -34,8 +161,7 @@ def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFi
     """One file, read; raises Missing if there is none of that number any more."""
     if not 0 <= number < len(pending.files) or pending.kept_at is not None:
         raise Missing("There is no such file in this upload.")
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    with pending_uploads.in_use(pending):
+    with pending.shelf.in_use(pending):
         most_bytes = request.app.state.settings.max_body_bytes
         inspected = look(pending.files[number], pending.rig, most_bytes, pending.files)
     campaigns = [campaign.with_estimator(pending.estimator) for campaign in inspected.campaigns]
@@ -100,7 +226,7 @@ def _shown(
 
 def _figures(pending: PendingUpload, number: int, inspected: InspectedFile, summary: FileSummary) -> list[Drawn]:
     mapped = _mapped(pending, inspected, summary)
-    force_course = course_figure.course(inspected, summary, pending.rig, turned=pending.turned)
+    force_course = course(inspected, summary, pending.rig, turned=pending.turned)
     return [*force_course, *figures(inspected, f"/upload/{pending.id}/{number}/", mapped)]
 
 

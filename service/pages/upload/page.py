@@ -1,40 +1,46 @@
 """Upload: files are read, shown channel by channel, and stored only on confirmation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any
 
+import orjson
 from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
-from service.dependencies import WRITE, Store, Table
-from service.ingest import field_words, rig_words, skin_imports
+from service.dependencies import Store, Table
+from service.ingest import rig_words, skin_imports
 from service.ingest.accept import RIG
-from service.ingest.reading import MOST_RECORDINGS, keeping
+from service.ingest.reading import MOST_RECORDINGS, InspectedFile, keeping
 from service.ingest.uploads import UploadFolder, received, texts
 from service.pages.shared import same_request
-from service.pages.shared.conditions import condition_columns
+from service.pages.shared.downloads import Numbers, attachment, downloadable
 from service.pages.shared.figures import Drawn
-from service.pages.shared.forms import FORM_OF_SESSION, TOKEN, Form, require_form_token, see
+from service.pages.shared.formats import condition_columns
+from service.pages.shared.forms import FORM_OF_SESSION, NOT_ASKED, TOKEN, Form, require_form_token, see
 from service.pages.shared.html import page
-from service.pages.upload import (
-    error_words,
-    exported_skin,
-    file_summary,
-    recorded_time,
-    similar_errors,
-    single_files,
-    spring_mapping,
-    templates,
-    workbench,
-)
+from service.pages.upload import error_words, exported_skin, file_summary, templates
 from service.pages.upload import mapping as mappings
+from service.pages.upload.figures import lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, RecordingSummary
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, skin_of, take_rig
-from service.pages.upload.looking import channels_of, held_by_some, in_turn, is_unsaid, look_at_all, shown, used_twice
-from service.pages.upload.of_session import Pending
-from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
+from service.pages.upload.looking import (
+    CORRECTS,
+    SKIN_FIELD,
+    channels_of,
+    field_errors,
+    held_by_some,
+    in_turn,
+    is_unsaid,
+    keep_good,
+    look_at_all,
+    looked,
+    shown,
+    skin_of,
+    take_rig,
+    used_twice,
+)
+from service.pages.upload.pending_uploads import Pending, PendingUpload, PendingUploads, UploadOfSession
 from service.store import Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin import InvalidInput
@@ -43,6 +49,7 @@ from underskin.recordings.frf.estimators import checked_estimator
 from underskin.recordings.rig_guess import guessed
 
 router = APIRouter(prefix="/upload")
+
 
 _LONGEST_FIELD = 1000  # bytes of a field other than the files
 _ESTIMATOR = "estimator"
@@ -57,21 +64,18 @@ def form(
     store: Store,
     skin: Annotated[str, Query(max_length=200)] = "",
     corrects: Annotated[str, Query(max_length=200)] = "",
+    error: Annotated[str | None, NOT_ASKED] = None,
 ) -> Response:
     """Asks for files; `corrects`: the campaign that they replace."""
-    return _form(request, store, skin, corrects)
-
-
-def _form(request: Request, store: Database, skin: str, corrects: str, error: str | None = None) -> Response:
     skin_ids = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     corrected = store.read(campaigns.find, corrects) if corrects else None
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    cookie = session.cookie_in(dict(request.scope["headers"]))
+    held: PendingUploads = request.app.state.pending_uploads
+    cookie = session.cookie_of(request)
     return page(
         request,
         "upload.html",
-        waiting=pending_uploads.waiting(cookie),
-        discarded=pending_uploads.discarded(cookie),
+        waiting=held.waiting(cookie),
+        discarded=held.discarded(cookie),
         status=200 if error is None else 422,
         error=error,
         skin=skin,
@@ -83,11 +87,10 @@ def _form(request: Request, store: Database, skin: str, corrects: str, error: st
     )
 
 
-@router.post("", dependencies=WRITE)
+@router.post("")
 async def send(request: Request, store: Store) -> Response:
     """Receives files for preview; nothing is stored."""
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    cookie = session.cookie_in(dict(request.scope["headers"]))
+    held: PendingUploads = request.app.state.pending_uploads
     folder: UploadFolder = request.app.state.uploads
     async with received(request, folder) as sent:
         unlabelled = [part for part in sent if part.label is None]
@@ -98,23 +101,23 @@ async def send(request: Request, store: Store) -> Response:
         if not given:
             error = "No file came. Choose one, or drop it on the page."
             filled = fields.get(SKIN_FIELD, ""), fields.get(CORRECTS, "")
-            return await run_in_threadpool(_form, request, store, *filled, error)
+            return await run_in_threadpool(form, request, store, *filled, error)
         corrects = fields.get(CORRECTS) or None
         estimator_typed = fields.get(_ESTIMATOR)
         estimator = checked_estimator(_ESTIMATOR, estimator_typed) if estimator_typed else None
         skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
-        pending = await folder.threads.run(partial(pending_uploads.put, cookie, given))
+        pending = await folder.threads.run(partial(held.put, session.cookie_of(request), given))
         pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
         await in_turn(take_rig, store, pending, rig)
     try:
-        with pending_uploads.in_use(pending):
+        with held.in_use(pending):
             if await run_in_threadpool(exported_skin.holds_skin, pending):
                 async with skin_imports.one_at_a_time:
                     await run_in_threadpool(exported_skin.look, store, pending)
             else:
                 await in_turn(look_at_all, request, pending)
     except BaseException:
-        pending_uploads.remove(pending)
+        held.remove(pending)
         raise
     return see(f"/upload/{pending.id}")
 
@@ -160,8 +163,8 @@ def _understood(
         corrected=None if pending.corrects is None else store.read(campaigns.find, pending.corrects),
         number=file,
         file=pending.seen[file],
-        groups=similar_errors.of_files(pending.seen),
-        refusals=similar_errors.of_recordings(pending.seen[file]),
+        groups=error_words.of_files(pending.seen),
+        refusals=error_words.of_recordings(pending.seen[file]),
         figures=figures,
         good=good,
         refused=sum(
@@ -190,15 +193,11 @@ def _understood(
         layout=mappings.sensors_text(document),
         mapping=mappings,
         error_words=error_words,
-        field_words=field_words,
+        rig_words=rig_words,
         is_stated=lambda name: name == rig_description.BLOCK_NAME or file_summary.may_state(pending.seen, name),
-        spring=spring_mapping,
         carried_over=[] if pending.remembered is None or pending.rig is None else rig_words.typed_of(pending.rig),
-        workbench=workbench,
-        single_files=single_files,
-        recorded_time=recorded_time,
-        in_formulas=workbench.in_formulas(document, channels),
-        wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
+        in_formulas=mappings.in_formulas(document, channels),
+        wrong_formulas=mappings.formula_errors(pending.refused, pending.seen[file]),
         offered=templates.offered(store, pending, pending.seen[file]),
         same=same_request.files(
             request,
@@ -210,17 +209,17 @@ def _understood(
     )
 
 
-@router.post("/{upload_id}/mapping", dependencies=WRITE)
+@router.post("/{upload_id}/mapping")
 async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again with the values of the form."""
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
     document, wrong = mappings.document_of(sent, base)
     guess = guessed(channels_of(pending), pending.seen[0].properties, {}, pending.seen[0].texts)
-    pending.draft = workbench.with_guesses(document, base, guess)
-    of_files = single_files.typed(sent, pending.files)
+    pending.draft = mappings.with_guesses(document, base, guess)
+    of_files = mappings.typed_of_files(sent, pending.files)
     units_checked = bool(document.get("units_checked"))
-    values, wrong_of_files = single_files.values_of(
+    values, wrong_of_files = mappings.values_of_files(
         of_files, pending.files, document["kind"], units_checked=units_checked
     )
     wrong += wrong_of_files
@@ -241,7 +240,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     return see(f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/template", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/{upload_id}/template", dependencies=[FORM_OF_SESSION])
 async def use_template(request: Request, pending: Pending, store: Store) -> Response:
     """Reads the files as earlier files of the same instrument."""
     await run_in_threadpool(use_template_of, store, pending)
@@ -249,7 +248,7 @@ async def use_template(request: Request, pending: Pending, store: Store) -> Resp
     return see(f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/afresh", dependencies=[*WRITE, FORM_OF_SESSION])
+@router.post("/{upload_id}/afresh", dependencies=[FORM_OF_SESSION])
 async def start_afresh(request: Request, pending: Pending) -> Response:
     """Reads the files without values remembered from earlier ones."""
     pending.start_afresh()
@@ -263,7 +262,7 @@ def use_template_of(store: Database, pending: PendingUpload) -> None:
     templates.use(store, pending, _latest(store, pending.skin or skin))
 
 
-@router.post("/{upload_id}/signs", dependencies=WRITE)
+@router.post("/{upload_id}/signs")
 async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again with curves that count pressing negative inverted, or unchanged."""
     pending.turned = sent.get("turned") == "yes" and not pending.is_depth_composed
@@ -271,7 +270,7 @@ async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response
     return see(f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/keep", dependencies=WRITE)
+@router.post("/{upload_id}/keep")
 async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
     """Stores the valid part."""
     async with keeping(store):
@@ -280,14 +279,14 @@ async def keep(request: Request, sent: Form, pending: Pending, store: Store, tab
     return see(pending.kept_at or f"/upload/{pending.id}")
 
 
-@router.post("/{upload_id}/skin", dependencies=[*WRITE, FORM_OF_SESSION])
-async def bring_in(request: Request, pending: Pending, store: Store) -> Response:
+@router.post("/{upload_id}/skin", dependencies=[FORM_OF_SESSION])
+async def bring_in(pending: Pending, store: Store) -> Response:
     """Imports an exported skin."""
     if pending.skin_summary is None:
         raise Missing("There is no exported skin in this upload.")
     async with skin_imports.one_at_a_time:
         store.require_hope()
-        await run_in_threadpool(exported_skin.bring_in, request, store, pending)
+        await run_in_threadpool(exported_skin.bring_in, store, pending)
     return see(pending.kept_at or f"/upload/{pending.id}")
 
 
@@ -295,3 +294,48 @@ def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
     """What the campaigns of a skin say of it."""
     row = None if skin is None else store.read(campaigns.describing, skin)
     return {} if row is None else dict(row.about["skin"])
+
+
+@router.get("/{upload_id}/rig.json")
+def rig_json(pending: Pending) -> Response:
+    """The rig description in use."""
+    if pending.rig is None:
+        raise Missing("There is no rig description yet.")
+    content = orjson.dumps(pending.rig.document, option=orjson.OPT_INDENT_2)
+    return attachment("rig.json", content, "application/json")
+
+
+@downloadable(router, "/{upload_id}/{file}/traces")
+async def traces_csv(request: Request, pending: Pending, file: int) -> Numbers:
+    """The channels of a file's first part."""
+    return await in_turn(_csv, "traces", trace_columns, request, pending, file)
+
+
+@downloadable(router, "/{upload_id}/{file}/frf")
+async def frf_csv(request: Request, pending: Pending, file: int) -> Numbers:
+    """The FRFs of a file."""
+    return await in_turn(_csv, "frf", lines_columns, request, pending, file)
+
+
+def _csv(
+    name: str,
+    columns: Callable[[InspectedFile], Mapping[str, Sequence[Any]]],
+    request: Request,
+    pending: PendingUpload,
+    file: int,
+) -> Numbers:
+    return Numbers(name, columns(looked(request, pending, file)))
+
+
+@router.post("/{upload_id}/discard", dependencies=[FORM_OF_SESSION])
+def discard(pending: Pending) -> Response:
+    """Puts it aside; for a while it can be taken back."""
+    pending.discarded = True
+    return see("/upload")
+
+
+@router.post("/{upload_id}/restore", dependencies=[FORM_OF_SESSION])
+def restore(pending: UploadOfSession) -> Response:
+    """Takes back that it was discarded."""
+    pending.discarded = False
+    return see(f"/upload/{pending.id}")

@@ -14,15 +14,20 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from fastapi import Depends, Request
+
+from service.auth import session
 from service.ingest.uploads import Upload
 from service.pages.shared.figures import Drawn
 from service.pages.upload.file_summary import FileSummary
-from service.pages.upload.skin_summary import SkinSummary
 from service.store import Missing
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import RigDescription
+
+if TYPE_CHECKING:
+    from service.pages.upload.exported_skin import SkinSummary
 
 LASTS_S = 3600.0
 _MOST_UPLOADS = 50
@@ -56,6 +61,7 @@ class PendingUpload:
     files: Sequence[Upload]
     size: int
     used: float
+    shelf: "PendingUploads"  # which holds it
     skin: str | None = None
     rig: RigDescription | None = None
     rig_label: str | None = None  # the file that a request would send it as; None where none need be sent
@@ -70,7 +76,7 @@ class PendingUpload:
     corrects: str | None = None  # the campaign that it replaces
     reason: str = ""  # why it does
     who: str = ""  # that says so, as typed
-    skin_summary: SkinSummary | None = None  # where it is an exported skin
+    skin_summary: "SkinSummary | None" = None  # where it is an exported skin
     negative: bool = False  # whether curves of it count pressing negative
     turned: bool = False  # whether those were turned
     kept_at: str | None = None  # the page of the stored data
@@ -128,7 +134,7 @@ class PendingUploads:
         folder.mkdir()
         files = [replace(file, path=file.path.rename(folder / str(number))) for number, file in enumerate(sent)]
         size = sum(file.path.stat().st_size for file in files)
-        added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic())
+        added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic(), self)
         with self._lock:
             gone = self._of_session(added.session)[_MOST_OF_SESSION - 1 :]
             for old in gone:
@@ -226,3 +232,22 @@ def _worth(held: PendingUpload) -> tuple[bool, float]:
 
 def _digest(cookie: str) -> str:
     return hashlib.sha256(cookie.encode()).hexdigest()
+
+
+def _upload(request: Request, upload_id: str) -> PendingUpload:
+    """The upload of an address; raises Missing if it is not the session's own."""
+    held: PendingUploads = request.app.state.pending_uploads
+    return held.find(session.cookie_of(request), upload_id)
+
+
+UploadOfSession = Annotated[PendingUpload, Depends(_upload)]
+
+
+def _pending(upload: UploadOfSession) -> PendingUpload:
+    """The same unless it was discarded; raises Missing if it was."""
+    if upload.discarded:
+        raise Missing("This upload was discarded. For an hour it can be taken back on the page “Upload”.")
+    return upload
+
+
+Pending = Annotated[PendingUpload, Depends(_pending)]

@@ -6,10 +6,10 @@ from typing import Any
 
 import orjson
 
-from service.ingest.field_words import SKIN
 from service.ingest.instruments import template_of, with_skin
-from service.pages.upload import workbench
+from service.ingest.rig_words import SKIN
 from service.pages.upload.file_summary import FileSummary
+from service.pages.upload.mapping import tares_of
 from service.pages.upload.pending_uploads import PendingUpload, Remembered
 from service.store import AnyRow, Database, Missing, instrument_templates
 from underskin.recordings import rig_description
@@ -45,7 +45,7 @@ def offered(store: Database, pending: PendingUpload, file: FileSummary) -> Offer
         document["channels"],
         document.get("derived") or {},
         document.get("trim") or {},
-        workbench.tares_of(document["channels"]),
+        tares_of(document["channels"]),
         document.get("units_checked", False),
     )
 

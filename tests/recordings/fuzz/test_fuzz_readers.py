@@ -168,8 +168,7 @@ def damaged(draw: st.DrawFn, files: list[bytes]) -> bytes:
 
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("kind", sorted(MODULES))
-def test_damaged_files_refused_name(reader: Reader, kind: str, part: int) -> None:
-    """Damaged files are refused with their name."""
+def test_damaged_files_are_refused_with_their_name(reader: Reader, kind: str, part: int) -> None:
     files = sound_files()[kind]
     for sound in files:
         assert reader.said(kind, sound) == ("refused" if kind == "WAV" else "read")  # sound has no channel `force`
@@ -189,9 +188,7 @@ def test_damaged_files_refused_name(reader: Reader, kind: str, part: int) -> Non
 
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("kind", sorted(MODULES) if SOAK else FOREIGN)
-def test_damaged_files_refused_process_apart(kind: str, part: int) -> None:
-    """Damaged files are refused by the process apart."""
-
+def test_damaged_files_are_refused_by_the_process_apart(kind: str, part: int) -> None:
     @seed(part)
     @LIKE_ALL(max_examples=COUNT_APART)
     @given(data=damaged(sound_files()[kind]))

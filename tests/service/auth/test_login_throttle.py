@@ -9,9 +9,8 @@ import httpx
 import pytest
 from starlette.requests import Request
 
-from service.auth.client_address import client_address, network_of
 from service.auth.keys import KeyStore
-from service.auth.login_throttle import AT_ONCE, SECONDS, LoginThrottle
+from service.auth.login_throttle import AT_ONCE, SECONDS, LoginThrottle, client_address, network_of
 from service.settings import Settings
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.server import running

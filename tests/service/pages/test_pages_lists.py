@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from openpyxl import load_workbook
 
-from service.pages.shared.workbooks import workbook
+from service.pages.shared.downloads import workbook
 from tests.service.pages.conftest import Visit
 from tests.support.cases import first
 from tests.support.store_server import Server, campaign

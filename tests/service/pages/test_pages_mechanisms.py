@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from service.store import database, diagnosed_together, diagnoses
-from service.usecases.mechanism_findings import findings
+from service.usecases.mechanism_catalogue import findings
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import said
 from tests.support.cases import first

@@ -8,7 +8,7 @@ import orjson
 import pytest
 from scipy import stats
 
-from service.pages.skin.figures import drawn_map, map_rows
+from service.pages.skin import drawn_map, map_rows
 from service.schemas.skins import History, Point, SensorHistory, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.array_history import SIGNIFICANT, holm, trend

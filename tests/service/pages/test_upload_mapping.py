@@ -7,10 +7,9 @@ from typing import Any
 import pytest
 import yaml
 
-from service.pages.upload import recorded_time
 from service.pages.upload.error_words import field_words
 from service.pages.upload.file_summary import ChannelSummary
-from service.pages.upload.mapping import document_of, sensors_text
+from service.pages.upload.mapping import document_of, sensors_text, time_shown
 from tests.support.repository import ROOT
 from underskin.recordings import rig_description
 from underskin.recordings.rig_guess import guessed
@@ -97,11 +96,11 @@ def test_time_typed_lab_s_zone_shown_typed(monkeypatch: pytest.MonkeyPatch) -> N
     for typed in ("2026-05-03 14:30", "3.5.2026 14:30", "2026-05-03T12:30Z"):
         found, wrong = document_of({"recorded_at": typed}, {})
         assert wrong == []
-        assert recorded_time.shown(found["recording"]["recorded_at"]) == "2026-05-03 14:30"
+        assert time_shown(found["recording"]["recorded_at"]) == "2026-05-03 14:30"
         moment = datetime.fromisoformat(found["recording"]["recorded_at"])
         assert moment == datetime(2026, 5, 3, 12, 30, tzinfo=UTC)
     found, (wrong_time,) = document_of({"recorded_at": "May"}, {})
-    assert (wrong_time.field, recorded_time.shown(found["recording"]["recorded_at"])) == (
+    assert (wrong_time.field, time_shown(found["recording"]["recorded_at"])) == (
         "recording.recorded_at",
         "May",
     )

@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 
 from service.ingest.instruments import template_of, with_skin
-from service.pages.upload.mapping import document_of
-from service.pages.upload.workbench import rows
+from service.pages.upload.mapping import derived_rows, document_of
 from tests.support.raw_curves import rig_of_raw_curve
 from underskin.recordings import rig_description
 
@@ -15,7 +14,7 @@ from underskin.recordings import rig_description
 def form_of(document: dict[str, Any], **changes: str) -> dict[str, str]:
     """What a browser sends of the part of the form that makes curves."""
     form = {"kind": document["kind"], "units_checked": "yes", "poisson_ratio": "0.5", "indenter_radius_mm": "0.0075"}
-    for number, (name, formula, field) in enumerate(rows(document)):
+    for number, (name, formula, field) in enumerate(derived_rows(document)):
         told = {"name": name, "formula": formula, "is": field}
         form |= {f"derived-{part}-{number}": text for part, text in told.items()}
     form |= {f"tare-{name}": f"{how.get('tare_percent', '')}" for name, how in document["channels"].items()}

@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.support.oracle import NEEDS_ORACLE, linear_layer_values
+from tests.support.oracle import linear_layer_values
 from underskin import load_table
 from underskin.physics import half_space
 from underskin.units import Floats
@@ -96,7 +96,6 @@ def test_both_paths_read_a_query_alike(http: httpx.Client, query: str) -> None:
         assert short.json()["errors"] == long.json()["errors"]
 
 
-@NEEDS_ORACLE
 def test_linear_limit_equals_the_exact_values(http: httpx.Client) -> None:
     rho, a, offset, value = linear_layer_values("sigma_hertz")
     used = (offset == 0) & (value > 0.01) & (a <= 3) & (rho <= 3)

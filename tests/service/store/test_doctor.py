@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from service.settings import Settings
-from service.usecases.checkup import examine
-from service.usecases.observation import Level
+from service.usecases.checkup import Level, examine
 from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
 from tests.support.diagnosed import sent
 from tests.support.store_server import Place, campaign, running

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from service.routes.pressed_skin import D33_EXAMPLE as D33
-from service.routes.pressed_skin import FRF_EXAMPLE as FRF
+from service.routes.computed import D33_EXAMPLE as D33
+from service.routes.computed import FRF_EXAMPLE as FRF
 from tests.service.waiting import until
 from tests.support.store_server import Place, Server, campaign, running
 

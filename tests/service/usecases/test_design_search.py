@@ -12,9 +12,8 @@ import pytest
 from bench.soak import SOAK
 from service.schemas.design import DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
-from service.usecases.design_search import Searched, search
+from service.usecases.design_search import Searched, largest_pitch, search
 from service.usecases.materials import ELASTOMERS, FILMS, MATERIALS
-from service.usecases.two_point import largest_pitch
 from tests.support.cases import first
 from underskin import Skin, load_table
 from underskin.units import Floats

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from service.store import Database, database, open_store
-from service.usecases import mechanism_catalogue, mechanism_findings, mechanisms
+from service.usecases import mechanism_catalogue, mechanisms
 from tests.service.conftest import emptied
 from tests.service.routes.test_mechanisms import WARM
 from tests.support.diagnosed import diagnosed, report, resonant
@@ -18,10 +18,11 @@ def test_file_removed_catalogue_read_not_shown(tmp_path: Path, monkeypatch: pyte
     file = tmp_path / "warm_amplifier.yaml"
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
     file.write_text(WARM)
+    findings = mechanism_catalogue.findings
 
-    def removed(store: Database) -> mechanism_findings.Findings:
+    def removed(store: Database) -> mechanism_catalogue.Findings:
         file.unlink()
-        return mechanism_findings.findings(store)
+        return findings(store)
 
     store = open_store("", tmp_path)
     try:
@@ -48,6 +49,6 @@ def test_restored_store_holds_under_numbers_read(server: Server) -> None:
             emptied(server)
             stated = {**report()["mechanisms"][0], "name": mechanism}
             diagnosed(server, resonant(mechanism), {**report(), "mechanisms": [stated]})
-            assert set(mechanism_findings.findings(store).by_mechanism) == {mechanism}
+            assert set(mechanism_catalogue.findings(store).by_mechanism) == {mechanism}
     finally:
         store.close()

@@ -126,7 +126,7 @@ class Facts:
     @property
     def curves_differ(self) -> list[str]:
         """Clauses on curves whose moduli contradict each other, or that may be of a pulled or of a pressed sample."""
-        reasons = (Reason.CURVES_DIFFER, Reason.PULLED_OR_PRESSED)
+        reasons = (Reason.CURVES_DIFFER, Reason.SPECIMENS_DIFFER, Reason.PULLED_OR_PRESSED)
         return [finding.statement for finding in self.diagnosis.findings if finding.reason in reasons]
 
     @property
@@ -201,10 +201,11 @@ class Facts:
         }
 
     def _is_open(self, modulus: Mapping[str, Any], base: Mapping[str, Any]) -> bool:
-        """Whether the curves do not determine E: they may be of a sample that is pulled or pressed, or a force that an
-        unlisted law adds along the depth has taken up part of the contact's own: E by that law then is one of many, and
-        its interval excludes that of the base model."""
-        if any(finding.reason == Reason.PULLED_OR_PRESSED for finding in self.diagnosis.findings):
+        """Whether the curves do not determine E: they may be of a sample that is pulled or pressed, or held by platens
+        or not, or a force that an unlisted law adds along the depth has taken up part of the contact's own: E by
+        that law then is one of many, and its interval excludes that of the base model."""
+        are_open = (Reason.PULLED_OR_PRESSED, Reason.SPECIMENS_DIFFER)
+        if any(finding.reason in are_open for finding in self.diagnosis.findings):
             return True
         law = self.leading
         if law is None or law.combination[0] != "force" or law.combination[1] not in _ALONG_CURVE:
@@ -353,6 +354,10 @@ class Facts:
             "a law that is in no list acts on it": law is not None and not law.is_outside_band,
             "its force acts at the mains alone": self._holds_for_all(Reason.EXCITED_AT_MAINS),
             "its gain changes within the recordings": self._holds_for_all(Reason.GAIN_STEP, Reason.GAIN_DRIFTS),
+            "its gain changes over frequency": any(
+                finding.reason is Reason.GAIN_OVER_FREQUENCY and not finding.arguments["left_out"]
+                for finding in diagnosis.findings
+            ),
             self._by_other_sensors: bool(self._by_other_sensors),
             "no PVDF has such a value": plausibility.implausibility(
                 d33["value"], units_checked=self.problem.lines.campaign.units_checked

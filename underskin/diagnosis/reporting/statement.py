@@ -29,7 +29,7 @@ from underskin.diagnosis.selection.answers import Answer, remainder
 from underskin.diagnosis.selection.other_kinds import may_hide
 from underskin.diagnosis.validation.cross_validation import FAR_ABOVE
 from underskin.diagnosis.validation.signatures import Power
-from underskin.findings.codes import FindingCode, Lack, Lacking
+from underskin.findings.codes import FindingCode, Lack, Lacking, Reason
 from underskin.findings.finding import lacking
 from underskin.findings.formatting import clause, in_digits, in_percent, of_clauses, small
 from underskin.inversion.mixed_model import SDS_OF_95
@@ -122,6 +122,7 @@ def _answer_clauses(facts: Facts, doubts: Sequence[str], *, all_used: bool, all_
     """
     answers, verdict, model = facts.search.answers, facts.verdict, SIMPLEST[facts.problem.kind]
     presence, mechanisms, idle = facts.presence, facts.mechanisms, facts.idle
+    base_may_hold = any(finding.reason is Reason.SPECIMENS_DIFFER for finding in facts.diagnosis.findings)
     leader = answers[0]
     percent = in_percent(leader.probability)
     rivals = [answer for answer in answers[1:4] if answer.probability > NAMED]
@@ -161,7 +162,7 @@ def _answer_clauses(facts: Facts, doubts: Sequence[str], *, all_used: bool, all_
     but = but or [f"many rivals remain, each below {in_percent(NAMED)}"]
     shared = [group for group in certain if group["probability"] > leader.probability + NAMED]
     common = " and ".join(map(_group_in_words, shared))
-    doubtful = bool(idle or doubts) and leader.names != (NOTHING_MISSING,)
+    doubtful = bool(idle or doubts) and leader.names != (NOTHING_MISSING,) and not base_may_hold
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
     lead = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead

@@ -43,6 +43,7 @@ from underskin.diagnosis.several.sensors import (
     used_recordings,
     without_steps,
 )
+from underskin.diagnosis.several.sessions import by_session
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -61,8 +62,9 @@ def diagnose_together(
     Parameters
     ----------
     campaigns
-        Two at least; those with FRFs are sorted by the time of their first recordings where all have one. Curves alone
-        are diagnosed as those of one campaign.
+        Two at least; those with FRFs are sorted by the time of their first recordings where all have one, and parts of
+        one campaign, such as a file for each sensor or each press, are put together (sessions.py). One campaign, and
+        curves alone, are diagnosed as by themselves.
     table
         σ.
     name
@@ -85,13 +87,16 @@ def diagnose_together(
     with_frf, of_curves = by_frfs(curves_once(campaigns, set()))
     _check(with_frf, of_curves)
     refuse_copies(with_frf)
-    if not with_frf:
-        curves = with_curves(replace(of_curves[0], recordings=()), of_curves)
-        ordered, document = [], reported(diagnose(curves, table, progress, without=without)).document
+    sessions = by_session(with_frf)
+    _check_names([*sessions, *of_curves])
+    if len(sessions) > 1:
+        document = _document(name, sessions, of_curves, table, without, progress)
     else:
-        ordered = in_order(with_frf)
-        document = _document(name, ordered, of_curves, table, without, progress)
-    return {**document, "campaign": name, "campaigns": [campaign.name for campaign in (*ordered, *of_curves)]}
+        first = sessions[0] if sessions else replace(of_curves[0], recordings=())
+        of_one = with_curves(replace(first, name=name), of_curves)
+        document = reported(diagnose(of_one, table, progress, without=without)).document
+    names = [campaign.name for campaign in (*(sessions if len(sessions) > 1 else in_order(with_frf)), *of_curves)]
+    return {**document, "campaign": name, "campaigns": list(dict.fromkeys(names))}
 
 
 def _document(
@@ -247,10 +252,6 @@ def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:
     campaigns = [*with_frf, *of_curves]
     if len(campaigns) < 2:
         raise InvalidInput("campaigns", len(campaigns), "must be two at least, of one skin or material")
-    names = [campaign.name for campaign in campaigns]
-    for campaign in campaigns:
-        if names.count(campaign.name) > 1:
-            raise InvalidInput("campaigns", campaign.name, "must each have a name of its own")
     first = campaigns[0].skin
     for index, campaign in enumerate(campaigns):
         for field in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio"):
@@ -260,3 +261,10 @@ def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:
             if here != there and not (here and there and math.isclose(here, there, rel_tol=1e-9)):
                 allowed = f"must be {here:g}, as {campaigns[0].name} has it: they are to be of one skin"
                 raise InvalidInput(f"{campaign.name}: skin.{field}", there, allowed)
+
+
+def _check_names(campaigns: Sequence[Campaign]) -> None:
+    names = [campaign.name for campaign in campaigns]
+    for campaign in campaigns:
+        if names.count(campaign.name) > 1:
+            raise InvalidInput("campaigns", campaign.name, "must each have a name of its own")

@@ -36,7 +36,8 @@ from underskin.diagnosis.several.population import (
     benches,
     populations,
 )
-from underskin.diagnosis.several.sensors import CampaignDates, in_order
+from underskin.diagnosis.several.sensors import CampaignDates
+from underskin.diagnosis.several.sessions import by_session
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
@@ -69,9 +70,10 @@ def diagnose_fleet(
         with_frf, of_curves = by_frfs(curves_once(campaigns, seen))
         if not with_frf:
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
-        results[skin] = _latest([with_curves(campaign, of_curves) for campaign in with_frf], table, without)
-        if len(with_frf) > 1:
-            orders[skin] = CampaignDates.of(with_frf).order_clause()
+        sessions = by_session(with_frf)
+        results[skin] = _latest([with_curves(campaign, of_curves) for campaign in sessions], table, without)
+        if len(sessions) > 1:
+            orders[skin] = CampaignDates.of(sessions).order_clause()
         progress((number + 1) / (len(skins) + 1))
     names = [campaign.name for campaign in all_campaigns]
     usable = {skin: result for skin, result in results.items() if result.search or result.few}
@@ -82,10 +84,9 @@ def diagnose_fleet(
 
 
 def _latest(campaigns: Sequence[Campaign], table: SigmaTable, without: Collection[str]) -> DiagnosisResult:
-    """The diagnosis of the latest campaign with a result of its own, else of the latest with one together with
-    others."""
+    """The diagnosis of the last campaign with a result of its own, else of the last with one together with others."""
     results: list[DiagnosisResult] = []
-    for campaign in in_order(campaigns)[::-1]:
+    for campaign in campaigns[::-1]:
         results.append(diagnose(campaign, table, without=without))
         if results[-1].search is not None:
             return results[-1]

@@ -60,7 +60,7 @@ class CampaignDates:
     @classmethod
     def of(cls, campaigns: Sequence[Campaign]) -> Self:
         """The dates as the recordings state them."""
-        return cls([campaign.name for campaign in campaigns], [_first_date(campaign) for campaign in campaigns])
+        return cls([campaign.name for campaign in campaigns], [first_date(campaign) for campaign in campaigns])
 
     @property
     def ordered(self) -> bool:
@@ -98,7 +98,8 @@ class CampaignDates:
         return f"not every campaign has a date, so they count in the order in which they were given: {listed}"
 
 
-def _first_date(campaign: Campaign) -> str | None:
+def first_date(campaign: Campaign) -> str | None:
+    """The day of its first recording as stated; None where none has a time."""
     times = (recording.recorded_at for recording in frf_recordings(campaign))
     return min((str(time)[:10] for time in times if time is not None), default=None)
 

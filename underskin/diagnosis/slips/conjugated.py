@@ -13,7 +13,7 @@ nor a vibrating part explain the phase as it is. Where a lag of the force channe
 stated and nothing is changed.
 """
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from math import comb, log
@@ -44,10 +44,9 @@ _PLAIN = 2 * (GAIN - _LOG_PRIOR)  # of χ², by which a reading must then exceed
 _FIELD = "frf_im_pc_per_n"
 
 
-def conjugated(screened: Screened, imported: Collection[str]) -> Iterator[Alternative]:
-    """The conjugated ones of the recordings that were `imported` as FRFs (ids): FRFs computed here are in the
-    convention."""
-    recordings = [recording for recording in screened.recordings if recording.id in imported]
+def conjugated(screened: Screened) -> Iterator[Alternative]:
+    """The conjugated ones of the imported FRFs."""
+    recordings = [recording for recording in screened.recordings if recording.id in screened.imported]
     campaign = replace(screened.campaign, recordings=tuple(recordings))
     bands = log_frf_bands(campaign) if recordings else None
     if bands is None or not bands.telling.any():

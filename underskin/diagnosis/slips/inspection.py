@@ -8,7 +8,6 @@ a time, the most probable first, since each resembles the others.
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from underskin.diagnosis.slips.silent import silent
 from underskin.diagnosis.slips.table import Screened, Slip, without_slips
 from underskin.diagnosis.slips.table_domain import within_tables
 from underskin.diagnosis.slips.warm_up import warm_ups
-from underskin.diagnosis.slips.wrong_forces import are_many, contradicting_forces, together, wrong_forces
+from underskin.diagnosis.slips.wrong_forces import without_wrong_forces
 from underskin.diagnosis.slips.wrong_positions import all_positions, at_sensors, wrong_positions
 from underskin.diagnosis.slips.wrong_units import (
     contradicting,
@@ -43,13 +42,13 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes
 
 LEAST_RECORDINGS = 2  # to compare one with another
+_FIELD = "frf_re_pc_per_n"
 _SAME = 1e-4  # relative difference of copies: files round numbers to some digits
 
-# The table of slips, in the order in which recordings can be judged: forces and declared values, then phases and
-# labels, for which no response has to be right, then responses beside the base model.
-OF_SERIES: Sequence[Slip] = (wrong_forces,)
+# The table of slips, in the order in which recordings can be judged: declared values, then phases and labels, for which
+# no response has to be right, then responses beside the base model.
 OF_VALUES: Sequence[Slip] = (wrong_values, wrong_positions)
-OF_LABELS: Sequence[Slip] = (exchanged_labels,)
+OF_LABELS: Sequence[Slip] = (conjugated, exchanged_labels)
 OF_RESPONSES: Sequence[Slip] = (
     silent,
     wrong_responses,
@@ -70,15 +69,11 @@ def inspect(campaign: Campaign, table: SigmaTable, keep_ids: Collection[str] | N
     plausible modulus brings them within.
     """
     given = list(frf_recordings(campaign)) if campaign.recordings else []
-    contradictions = contradicting_forces(given)
-    of_forces = together(contradictions, len(given))
-    if are_many(contradictions, given) and not campaign.units_checked:
+    recorded, of_forces, are_many = without_wrong_forces(given, units_checked=campaign.units_checked)
+    if are_many:
         return _inspected(campaign, [], of_forces, _impossible(of_forces, confirmable=True))
-    recorded = given
-    if contradictions and not campaign.units_checked:
-        recorded, of_forces = without_slips(Screened(campaign, given, table), OF_SERIES)
     series = as_lines(recorded)
-    imported = {recording.id for recording in recorded if recording.sample_rate_hz is None}
+    imported = frozenset(recording.id for recording in recorded if recording.sample_rate_hz is None)
     inspected = _inspect_lines(campaign, series.recordings, imported, table, keep_ids)
     findings = as_given(given, [*of_forces, *series.findings, *inspected.findings])
     return replace(inspected, findings=findings, uneven=series.uneven, unsure=series.unsure)
@@ -87,13 +82,13 @@ def inspect(campaign: Campaign, table: SigmaTable, keep_ids: Collection[str] | N
 def _inspect_lines(
     campaign: Campaign,
     recorded: Sequence[FrfRecording],
-    imported: Collection[str],
+    imported: frozenset[str],
     table: SigmaTable,
     keep_ids: Collection[str] | None,
 ) -> Inspected:
     with_lines, of_lines = _with_lines(recorded)
     originals, copies = _without_copies(with_lines)
-    screened = Screened(campaign, originals, table)
+    screened = Screened(campaign, originals, table, imported)
     misgiven = all_positions(screened)
     recordings, of_values = without_slips(screened, OF_VALUES)
     findings = [*of_lines, *copies, *of_values]
@@ -109,7 +104,7 @@ def _inspect_lines(
         lacking = _impossible([*doubtful, *contradictory], confirmable=not contradictory)
         return _inspected(campaign, [], findings, lacking)
     findings += [*_constant_axes(recordings), *faint_oscillation(recordings)]
-    recordings, of_labels = without_slips(screened, [partial(conjugated, imported=imported), *OF_LABELS])
+    recordings, of_labels = without_slips(screened, OF_LABELS)
     recordings, beyond, of_domain = within_tables(campaign, recordings, table, keep_ids)
     findings += [*of_labels, *of_domain]
     if not recordings:
@@ -122,7 +117,7 @@ def _inspect_lines(
         return _inspected(campaign, recordings, findings)
     screened = replace(screened, recordings=recordings)
     if screened.comparison.unresponsive.all():
-        findings.append(Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(recordings)}))
+        findings.append(Finding(Reason.SILENT_CAMPAIGN, "", _FIELD, {"recordings": len(recordings)}))
         return _inspected(campaign, [], findings, Lacking(Lack.NO_RESPONSE))
     if (contradiction := contradicting(screened.comparison.ratio)) is not None:
         return _inspected(campaign, [], [*findings, contradiction], Lacking(Lack.TWO_RECORDINGS_CONTRADICT))
@@ -164,7 +159,7 @@ def _with_lines(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording],
             reason = Reason.ZERO_LINES
         if reason is not None:
             arguments = {"lines": int((~finite).sum())}
-            findings.append(Finding(reason, recording.id, "frf_re_pc_per_n", arguments))
+            findings.append(Finding(reason, recording.id, _FIELD, arguments))
         if reason in (None, Reason.LINES_NOT_FINITE):
             usable.append(recording)
     return usable, findings
@@ -174,25 +169,16 @@ def _without_copies(recordings: list[FrfRecording]) -> tuple[list[FrfRecording],
     """The recordings without copies, whose lines agree but for rounding; compared if their means nearly agree."""
     lines = [np.nan_to_num(lines_of(recording).values) for recording in recordings]
     size = np.array([float(np.abs(values).mean()) for values in lines])
-    original = np.arange(len(recordings))
-    order = np.argsort(size, kind="stable")
-    for rank, index in enumerate(order):
-        for earlier in order[:rank][::-1]:
-            if size[index] - size[earlier] > _SAME * size[index]:
-                break
-            if _alike(lines[index], lines[earlier]):
-                original[max(index, earlier)] = min(original[index], original[earlier])
-    findings = [
-        Finding(
-            Reason.DUPLICATED_RECORDING,
-            recordings[index].id,
-            "frf_re_pc_per_n",
-            {"original": recordings[int(first)].id},
-        )
-        for index, first in enumerate(original)
-        if first != index
-    ]
-    return [recording for index, recording in enumerate(recordings) if original[index] == index], findings
+    originals, findings = list[int](), list[Finding]()
+    for index, recording in enumerate(recordings):
+        near = (first for first in originals if abs(size[index] - size[first]) <= _SAME * size[index])
+        original = next((first for first in near if _alike(lines[first], lines[index])), None)
+        if original is None:
+            originals.append(index)
+        else:
+            arguments = {"original": recordings[original].id}
+            findings.append(Finding(Reason.DUPLICATED_RECORDING, recording.id, _FIELD, arguments))
+    return [recordings[index] for index in originals], findings
 
 
 def _alike(first: Complexes, second: Complexes) -> bool:

@@ -38,11 +38,13 @@ _MOST_LEVELS = 300  # recordings: the covariance of more takes minutes
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """The recordings that are looked at, and what is computed of them once."""
+    """The recordings that are looked at, and what is computed of them once. `imported`: the ids of those that came as
+    FRFs; those computed here are in the convention."""
 
     campaign: Campaign
     recordings: list[FrfRecording]
     table: SigmaTable
+    imported: frozenset[str] = frozenset()
 
     @cached_property
     def positions(self) -> dict[str, tuple[float, float]]:

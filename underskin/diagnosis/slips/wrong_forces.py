@@ -6,15 +6,13 @@ oscillation. The logarithms of both ratios are 0 ± 1, and off by ln 1000 togeth
 preload or the dynamic force, is in a neighbouring unit.
 """
 
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from math import log
 
 import numpy as np
 
-from underskin.diagnosis.slips.levels import Alternative
-from underskin.diagnosis.slips.table import GAIN, Screened
+from underskin.diagnosis.slips.table import GAIN
 from underskin.diagnosis.slips.wrong_units import MOST_SHARE, SLIP
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -31,24 +29,22 @@ _OFF = {  # whether the oscillation and the mean are off what is declared
 }
 
 
-def wrong_forces(screened: Screened) -> Iterator[Alternative]:
-    """Single recordings whose force contradicts what is declared."""
-    contradictions = contradicting_forces(screened.recordings)
-    if contradictions and not are_many(contradictions, screened.recordings):
-        ids = {finding.recording for _, finding in contradictions}
-        off = np.array([recording.id in ids for recording in screened.recordings])
-        findings = [replace(one, arguments={**one.arguments, "left_out": True}) for _, one in contradictions]
-        yield Alternative(0.0, min(nats for nats, _ in contradictions), undo=screened.without(off, *findings))
+def without_wrong_forces(
+    recordings: list[FrfRecording], *, units_checked: bool
+) -> tuple[list[FrfRecording], list[Finding], bool]:
+    """The recordings without single ones whose force contradicts what is declared, unless the units are checked; the
+    findings, and whether so many recordings are contradicted that it is no slip of single ones."""
+    findings = [finding for recording in recordings if (finding := _contradiction(recording)) is not None]
+    are_many = len(findings) > max(1.0, MOST_SHARE * len(recordings))
+    if units_checked or are_many:
+        return recordings, _together(findings, len(recordings)), are_many and not units_checked
+    ids = {finding.recording for finding in findings}
+    left_out = [replace(finding, arguments={**finding.arguments, "left_out": True}) for finding in findings]
+    return [recording for recording in recordings if recording.id not in ids], left_out, False
 
 
-def are_many(contradictions: Sequence[object], recordings: Sequence[FrfRecording]) -> bool:
-    """Whether so many recordings are contradicted that it is no slip of single ones."""
-    return len(contradictions) > max(1.0, MOST_SHARE * len(recordings))
-
-
-def together(contradictions: Sequence[tuple[float, Finding]], recordings: int) -> list[Finding]:
+def _together(findings: list[Finding], recordings: int) -> list[Finding]:
     """One finding where all recordings have the same, otherwise one for each."""
-    findings = [finding for _, finding in contradictions]
     kinds = {(finding.reason, finding.field, finding.arguments.get("given_in")) for finding in findings}
     if len(findings) == recordings > 1 and len(kinds) == 1:
         first = findings[0]
@@ -56,21 +52,17 @@ def together(contradictions: Sequence[tuple[float, Finding]], recordings: int) -
     return findings
 
 
-def contradicting_forces(recordings: Sequence[FrfRecording]) -> list[tuple[float, Finding]]:
-    """Of each recording whose force contradicts its declared values the gain of ln evidence, and the finding."""
-    return [contradiction for recording in recordings if (contradiction := _contradiction(recording)) is not None]
-
-
-def _contradiction(recording: FrfRecording) -> tuple[float, Finding] | None:
+def _contradiction(recording: FrfRecording) -> Finding | None:
+    """The finding on a force that contradicts the declared values of its recording."""
     if recording.force_n is None or recording.charge_pc is None:
         return None
     if (exchanged := exchanged_channels(recording)) is not None:
-        return np.inf, exchanged
+        return exchanged
     preload, dynamic_force_n = mean_of(recording.force_n), recording.dynamic_force_n
     guess = None if preload is None else force_unit(preload, recording.preload_n)
     if guess is not None and guess.meant[0][1] in _NO_PREFIX:
         values = {"mean_n": preload, "preload_n": recording.preload_n, "guess": guess}
-        return np.inf, Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", values)
+        return Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", values)
     oscillation = np.log(np.maximum(oscillation_of(recording.force_n) / dynamic_force_n, 1e-300))
     mean = None if preload is None else log(abs(preload) / recording.preload_n)
 
@@ -84,8 +76,7 @@ def _contradiction(recording: FrfRecording) -> tuple[float, Finding] | None:
         if mean is not None or of_oscillation == of_mean
     ]
     best, reason, is_larger = max(slips, key=lambda slip: slip[0])
-    gain = best - max(nats(0.0, 0.0), -0.5 * log(SLIP) ** 2)
-    if not gain > GAIN:
+    if not best - max(nats(0.0, 0.0), -0.5 * log(SLIP) ** 2) > GAIN:
         return None
     too_large = is_larger == (reason is Reason.SERIES_FORCE)  # else what is declared is too small
     arguments = {
@@ -96,4 +87,4 @@ def _contradiction(recording: FrfRecording) -> tuple[float, Finding] | None:
         "too_large": too_large,
         "given_in": "mN" if too_large else "kN",
     }
-    return gain, Finding(reason, recording.id, reason.value.partition("series_")[2] + "_n", arguments)
+    return Finding(reason, recording.id, reason.value.partition("series_")[2] + "_n", arguments)

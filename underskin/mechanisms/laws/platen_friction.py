@@ -42,11 +42,24 @@ def hidden_in_modulus(conditions: Conditions) -> Sequence[float]:
 
     Empty where samples of several shapes separate the two.
     """
-    shapes = [
+    if len(distinct_shapes(conditions)) != 1:
+        return ()
+    return [float(np.log1p(2 * friction * np.mean(_shapes(conditions)))) for friction in _FRICTIONS]
+
+
+def distinct_shapes(conditions: Conditions) -> list[float]:
+    """S² of the cylinders, the least of each of the shapes that separate friction and modulus, rising."""
+    distinct: list[float] = []
+    for shape in sorted(_shapes(conditions)):
+        if not distinct or shape > _LEAST_SHAPE_RATIO * distinct[-1]:
+            distinct.append(shape)
+    return distinct
+
+
+def _shapes(conditions: Conditions) -> list[float]:
+    """S² of each cylinder."""
+    return [
         (0.25 * recording.sample_diameter_mm / recording.sample_height_mm) ** 2
         for recording in conditions.recordings
         if isinstance(recording, CompressionConditions)
     ]
-    if not shapes or max(shapes) > _LEAST_SHAPE_RATIO * min(shapes):
-        return ()
-    return [float(np.log1p(2 * friction * np.mean(shapes))) for friction in _FRICTIONS]

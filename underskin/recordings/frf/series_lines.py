@@ -12,6 +12,7 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.frf.line_choice import Usable, excited_at_mains, gain_findings, noise_findings, usable_lines
 from underskin.recordings.frf.spectra import Frf, left_out_of
+from underskin.recordings.frf.two_levels import two_levels
 from underskin.units import Floats, to_lab
 
 _MANY = 0.1  # of the lines
@@ -36,8 +37,10 @@ def as_lines(recordings: Sequence[FrfRecording]) -> Estimated:
     """The recordings with their usable lines."""
     chosen, findings = chosen_lines(recordings, Reason.SERIES_NOT_USABLE)
     findings += [finding for name, lines in chosen.items() for finding in left_out_of(name, lines.frf.defects)]
+    of_each, of_levels = at_two_levels(chosen)
+    findings += [*of_each.values(), *of_levels]
     usable, series = list[FrfRecording](), dict[str, Usable]()
-    for recording in [recording for recording in recordings if recording.id in chosen]:
+    for recording in [one for one in recordings if one.id in chosen and one.id not in of_each]:
         lines = chosen[recording.id]
         if recording.sample_rate_hz is not None and not len(lines.choice.lines):
             none_follows = Finding(Reason.INCOHERENT, recording.id, "charge_pc")
@@ -85,6 +88,26 @@ def chosen_lines(recordings: Sequence[FrfRecording], refused: Reason) -> tuple[d
         except InvalidInput as refusal:
             findings.append(Finding(refused, recording.id, refusal.field, {"refusal": refusal}))
     return dict(zip(measured, usable_lines(list(measured.values())), strict=True)), findings
+
+
+def at_two_levels(chosen: Mapping[str, Usable]) -> tuple[dict[str, Finding], list[Finding]]:
+    """Recordings whose lines lie at two levels: by its id a finding on each that is left out for it, which are all
+    where most recordings have one level; otherwise the finding on those, which are used."""
+    found = {
+        name: levels
+        for name, lines in chosen.items()
+        if (levels := two_levels(lines.frf.frequency, lines.frf.values, lines.frf.used_or_all)) is not None
+    }
+    of_each = {
+        name: Finding(
+            Reason.GAIN_OVER_FREQUENCY, name, "frf_re_pc_per_n", asdict(levels) | {"left_out": True, "more": 0}
+        )
+        for name, levels in found.items()
+    }
+    if not found or 2 * len(found) < len(chosen):
+        return of_each, []
+    first, *others = of_each.values()
+    return {}, [replace(first, arguments={**first.arguments, "left_out": False, "more": len(others)})]
 
 
 def of_spoilt(name: str, lines: Usable) -> Finding | None:

@@ -5,7 +5,7 @@ brackets after either. Both sides of a sum need one dimension; units are convert
 """
 
 import ast
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents
-from underskin.recordings.readers import text
+from underskin.recordings.field_words import number_of
 from underskin.recordings.readers.expressions import Expression, Grammar, name_of, read, source
 from underskin.recordings.readers.unit_labels import (
     Exponents,
@@ -35,7 +35,7 @@ _GRAMMAR = Grammar(
 
 
 @dataclass(frozen=True)
-class Quantity:
+class _Quantity:
     """Values in SI, a scalar or (samples,), the exponents of their unit, and their original unit ("" of results)."""
 
     values: Any
@@ -43,88 +43,18 @@ class Quantity:
     label: str = ""
 
 
-QuantityOf = Callable[[str, str | None], Quantity]  # quantity of a name and the unit stated after it
-
-
 def parse(field: str, text: str) -> Expression:
     """Parse a formula; raises InvalidInput that names the invalid term."""
     return read(text, field, _GRAMMAR)
 
 
-def evaluate(formula: Expression, quantity_of: QuantityOf, file: str, place: str) -> Quantity:
-    """Its value, (samples,) or a scalar; `quantity_of` gives the quantity of a name.
-
-    Raises FileError that names the term whose unit or length does not fit.
-    """
-    with np.errstate(all="ignore"):
-        return _Evaluation(formula.text, quantity_of, file, place).of(formula.tree)
-
-
-def labels(formula: Expression) -> Iterator[str]:
-    """The units stated in it."""
-    stated = (node for node in ast.walk(formula.tree) if isinstance(node, ast.Subscript))
-    return (source(formula.text, node.slice) for node in stated)
-
-
-class _Evaluation:
-    """Computes a tree that `parse` has accepted."""
-
-    def __init__(self, text: str, quantity_of: QuantityOf, file: str, place: str) -> None:
-        self.text = text
-        self.quantity_of = quantity_of
-        self.file = file
-        self.place = place
-
-    def of(self, node: ast.expr, label: str | None = None) -> Quantity:
-        """The quantity of a node; `label`: the unit stated after it."""
-        if isinstance(node, ast.Subscript):
-            return self.of(node.value, source(self.text, node.slice))
-        name = name_of(self.text, node)
-        if name is not None:
-            return self.quantity_of(name, label)
-        if isinstance(node, ast.UnaryOp):
-            operand = self.of(node.operand)
-            return Quantity(-operand.values, operand.dimension)
-        if isinstance(node, ast.BinOp):
-            return self._combined(node)
-        return in_unit(float(ast.literal_eval(node)), label or "1")
-
-    def _combined(self, node: ast.BinOp) -> Quantity:
-        left, right = self.of(node.left), self.of(node.right)
-        if np.ndim(left.values) and np.ndim(right.values) and len(left.values) != len(right.values):
-            raise self._error(f"{self._source_of(node.left)} and {self._source_of(node.right)} differ in length")
-        if isinstance(node.op, ast.Mult):
-            return Quantity(left.values * right.values, times(left.dimension, right.dimension))
-        if isinstance(node.op, ast.Div):
-            if not np.ndim(right.values) and right.values == 0:
-                raise self._error(f"{self._source_of(node)}: is a division by 0")
-            return Quantity(np.divide(left.values, right.values), times(left.dimension, right.dimension, -1))
-        if left.dimension != right.dimension:
-            both = f"{self._with_unit(node.left, left)}, {self._with_unit(node.right, right)}"
-            raise self._error(
-                f"{self._source_of(node)}: {both}; only what has units of one kind can be added or subtracted"
-            )
-        sign = 1 if isinstance(node.op, ast.Add) else -1
-        return Quantity(left.values + sign * right.values, left.dimension)
-
-    def _with_unit(self, node: ast.expr, quantity: Quantity) -> str:
-        unit_words = f"the unit {quantity.label}" if quantity.label else described(quantity.dimension)
-        return f"{self._source_of(node)} has {unit_words}"
-
-    def _source_of(self, node: ast.expr) -> str:
-        return str(shown(source(self.text, node)))
-
-    def _error(self, reason: str) -> FileError:
-        return FileError(self.file, self.place, reason)
-
-
-def in_unit(values: Any, label: str) -> Quantity:
+def _in_unit(values: Any, label: str) -> _Quantity:
     """Values in a supported unit, `1` for numbers without one."""
     parsed_unit, dimension = unit(label), exponents(label)
     assert dimension is not None
-    return Quantity(
-        values if parsed_unit is None else values * parsed_unit.to_si, dimension, "" if parsed_unit is None else label
-    )
+    if parsed_unit is None:
+        return _Quantity(values, dimension)
+    return _Quantity(values * parsed_unit.to_si, dimension, label)
 
 
 Stated = Mapping[str, str | float]
@@ -163,23 +93,26 @@ class _Derivation:
 
     def __init__(self, block: Block, stated: Stated, file: str) -> None:
         self.block = block
-        self.stated = stated
-        self.file = file
         self.warnings: list[str] = []
-        self._constants: dict[str, Quantity] = {}
+        self._stated = stated
+        self._file = file
+        self._constants: dict[str, _Quantity] = {}
         self._place = ""
-        self._labels: list[str] = []
+        self._text = ""
+        self._labels: list[str] = []  # units of the channels of a formula, then those stated in it
 
     def missing(self, formula: Expression) -> list[str]:
         """Names of a formula that are neither channel, constant nor property."""
-        scalars = {*self.stated, *self._constants}
+        scalars = {*self._stated, *self._constants}
         return [name for name in formula.names if name not in scalars and self._channel(name) is None]
 
     def add(self, name: str, formula: Expression, place: str) -> None:
         """Add the channel of a formula; a constant is used by later formulas only."""
-        self._place, self._labels = place, []
-        quantity = evaluate(formula, self._quantity, self.file, place)
-        label = label_of(quantity.dimension, [*self._labels, *labels(formula)])
+        self._place, self._text, self._labels = place, formula.text, []
+        with np.errstate(all="ignore"):
+            quantity = self._of(formula.tree)
+        stated = [node.slice for node in ast.walk(formula.tree) if isinstance(node, ast.Subscript)]
+        label = label_of(quantity.dimension, [*self._labels, *(source(formula.text, node) for node in stated)])
         if label is None:
             raise self._error(f"{formula.text} has {described(quantity.dimension)}, which no channel can have")
         if np.ndim(quantity.values) == 0:
@@ -191,23 +124,56 @@ class _Derivation:
         self.block = replace(self.block, channels=(*self.block.channels, channel))
         self.warnings.append(f"channel {name!r} is derived: {formula.text}")
 
-    def _quantity(self, name: str, stated_unit: str | None) -> Quantity:
+    def _of(self, node: ast.expr, label: str | None = None) -> _Quantity:
+        """The quantity of a node; `label`: the unit stated after it."""
+        if isinstance(node, ast.Subscript):
+            return self._of(node.value, source(self._text, node.slice))
+        name = name_of(self._text, node)
+        if name is not None:
+            return self._named(name, label)
+        if isinstance(node, ast.UnaryOp):
+            operand = self._of(node.operand)
+            return _Quantity(-operand.values, operand.dimension)
+        if isinstance(node, ast.BinOp):
+            return self._combined(node)
+        return _in_unit(float(ast.literal_eval(node)), label or "1")
+
+    def _combined(self, node: ast.BinOp) -> _Quantity:
+        left, right = self._of(node.left), self._of(node.right)
+        if np.ndim(left.values) and np.ndim(right.values) and len(left.values) != len(right.values):
+            raise self._error(f"{self._source_of(node.left)} and {self._source_of(node.right)} differ in length")
+        if isinstance(node.op, ast.Mult):
+            return _Quantity(left.values * right.values, times(left.dimension, right.dimension))
+        if isinstance(node.op, ast.Div):
+            if not np.ndim(right.values) and right.values == 0:
+                raise self._error(f"{self._source_of(node)}: is a division by 0")
+            return _Quantity(np.divide(left.values, right.values), times(left.dimension, right.dimension, -1))
+        if left.dimension != right.dimension:
+            both = f"{self._with_unit(node.left, left)}, {self._with_unit(node.right, right)}"
+            raise self._error(
+                f"{self._source_of(node)}: {both}; only what has units of one kind can be added or subtracted"
+            )
+        sign = 1 if isinstance(node.op, ast.Add) else -1
+        return _Quantity(left.values + sign * right.values, left.dimension)
+
+    def _named(self, name: str, stated_unit: str | None) -> _Quantity:
+        """The quantity of a name, with the unit stated after it."""
         if name in self._constants:
             return self._constants[name]
         channel = self._channel(name)
         if channel is not None:
             label = self._unit(name, channel.label, stated_unit)
             self._labels.append(label)
-            return in_unit(channel.values, label)
-        given = self.stated[name]
-        number = text.number(given, text.decimal_mark([[given]], "\t")) if isinstance(given, str) else given
+            return _in_unit(channel.values, label)
+        number = number_of(self._stated[name])
         if number is None:
-            raise self._error(f"{name}: the file states {given!r:.{LONGEST_NAME}}, which is no number")
-        return in_unit(number, self._unit(name, labelled_unit(name), stated_unit))
+            given = f"{self._stated[name]!r:.{LONGEST_NAME}}"
+            raise self._error(f"{name}: the file states {given}, which is no number")
+        return _in_unit(number, self._unit(name, labelled_unit(name), stated_unit))
 
     def _channel(self, name: str) -> Channel | None:
         """The channel of that name; one whose heading ends with a unit only where nothing else has the name."""
-        stated = name in self.stated or name in self._constants
+        stated = name in self._stated or name in self._constants
         return self.block.channel(name) if stated else self.block.headed(name)
 
     def _unit(self, name: str, label: str, stated: str | None) -> str:
@@ -222,5 +188,12 @@ class _Derivation:
             raise self._error(f"{name} [{stated}]: is labelled {label!r}, but the formula says {stated!r}; {remedy}")
         return stated
 
+    def _with_unit(self, node: ast.expr, quantity: _Quantity) -> str:
+        unit_words = f"the unit {quantity.label}" if quantity.label else described(quantity.dimension)
+        return f"{self._source_of(node)} has {unit_words}"
+
+    def _source_of(self, node: ast.expr) -> str:
+        return str(shown(source(self._text, node)))
+
     def _error(self, reason: str) -> FileError:
-        return FileError(self.file, self._place, reason)
+        return FileError(self._file, self._place, reason)

@@ -35,7 +35,6 @@ _STATED = re.compile(r"(?P<name>[^\W\d_][^:=\t;]*?)\s*[:=]\s*(?P<value>[^\s:=].*
 _WITH_UNIT = re.compile(r"(?P<value>[-+]?[\d.,]+([eE][-+]?\d+)?)\s*(?P<unit>[^\s\d].*)")
 _NAME_AND_UNIT = re.compile(r"(?P<name>[^,:=]+),\s*(?P<unit>[^,:=\s]+)\s*[:=]\s*(?P<value>[^\s:=].*)")  # X, um: 25
 _MOST_TABLES = 100  # of a text
-_LINE = re.compile(r"line (\d+)")
 _STEP = re.compile(r"increment|interval", re.IGNORECASE)
 _SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
 _DECIMAL_WORDS = {".": "points", ",": "commas"}
@@ -57,43 +56,37 @@ def of_text(written: str, file: str) -> Contents:
 
     Another table begins below a blank line or a line of one cell, a title, with headings of its own.
     """
-    read = _tables_in(written, file, 0, _MOST_TABLES)
+    read = _tables_in(written, file, _MOST_TABLES)
     return read[0][1] if len(read) == 1 else _together(read)
 
 
-def _tables_in(written: str, file: str, offset: int, most: int) -> list[tuple[str, Contents]]:
-    """The tables of a text, each with its title; `offset`: the lines of the file above it, `most`: the tables that it
-    may have."""
+def _tables_in(written: str, file: str, most: int) -> list[tuple[str, Contents]]:
+    """The tables of a text, each with its title; `most`: the tables that it may have."""
     reader, head, found = _reader(written, file)
     start, error = _end_of_table_above(head, found, reader.table, file), None
     if start is None:
         try:
-            return [_read(reader, written, head, found, file, offset)]
+            return [_read(reader, written, head, found, file)]
         except FileError as refused:
-            error = FileError(
-                file, _LINE.sub(lambda line: f"line {int(line[1]) + offset}", refused.place), refused.reason
-            )
-            start = reader.sections[-1].last + 1 if reader.sections else 0
+            error, start = refused, reader.sections[-1].last + 1 if reader.sections else 0
     if start and most > 1:
         first, rest = _cut(written, start)
         if _begins_table(rest, reader.table, file):
-            above = _tables_in(first, file, offset, most - 1)
-            return [*above, *_tables_in(rest, file, offset + start, most - len(above))]
+            above = _tables_in(first, file, most - 1)
+            return [*above, *_tables_in("\n" * start + rest, file, most - len(above))]  # each line keeps its number
     if error is not None:
         raise error
-    return [_read(reader, written, head, found, file, offset)]
+    return [_read(reader, written, head, found, file)]
 
 
-def _read(
-    reader: RowReader, written: str, head: Sequence[str], found: Headings, file: str, offset: int
-) -> tuple[str, Contents]:
+def _read(reader: RowReader, written: str, head: Sequence[str], found: Headings, file: str) -> tuple[str, Contents]:
     """The only table of a text, and the title nearest above its headings; empty without one."""
     reader.take_all(written)
     _refuse_other_rows(head[: reader.table.start], reader.under, reader.table, file)
     _refuse_text_among_numbers(reader, file)
     titles = [line.strip() for line in head[: min(found.lines, default=0)] if line.strip()]
     title = titles[-1].strip(reader.table.separator) if titles and _is_title(titles[-1], reader.table) else ""
-    return title, _contents(reader, head, found, offset)
+    return title, _contents(reader, head, found)
 
 
 def _is_title(line: str, table: Table) -> bool:
@@ -157,10 +150,10 @@ def _reader(written: str, file: str) -> tuple[RowReader, Sequence[str], Headings
     return RowReader(table, frozenset(head[line].strip() for line in found.lines), file), head, found
 
 
-def _contents(reader: RowReader, head: Sequence[str], found: Headings, offset: int) -> Contents:
-    """What a reader has read of a text that begins below so many lines of the file."""
+def _contents(reader: RowReader, head: Sequence[str], found: Headings) -> Contents:
+    """What a reader has read."""
     table, repeated = reader.table, reader.headings
-    column_warnings = [*_text_column_warnings(reader, found), *_overload_warnings(reader, found, offset)]
+    column_warnings = [*_text_column_warnings(reader, found), *_overload_warnings(reader, found)]
     above, *between, under = (
         [line for line in lines if line.strip() not in repeated]
         for lines in (
@@ -184,9 +177,7 @@ def _contents(reader: RowReader, head: Sequence[str], found: Headings, offset: i
         if name:
             section_properties, _ = _properties(section_lines, table)
             properties |= {f"{name}.{name_in_section}": value for name_in_section, value in section_properties.items()}
-    return Contents(
-        tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, found, reader.sections, offset)
-    )
+    return Contents(tuple(blocks), properties, (*warnings, *column_warnings), _layout(table, found, reader.sections))
 
 
 def _table(written: str, file: str) -> tuple[Sequence[str], Table]:
@@ -276,23 +267,23 @@ def _texts(reader: RowReader, found: Headings, rows: slice) -> tuple[TextColumn,
     )
 
 
-def _overload_warnings(reader: RowReader, found: Headings, offset: int) -> Iterator[str]:
+def _overload_warnings(reader: RowReader, found: Headings) -> Iterator[str]:
     """Messages on values that an instrument marked as beyond its range."""
     for column, seen in reader.overloads.items():
         assert seen.first is not None
         cells = f"{seen.count} cells of column {found.names[column][0]!r} hold {seen.example[:_SHOWN]!r}"
-        first = f"the first on line {seen.first[0] + 1 + offset}"
+        first = f"the first on line {seen.first[0] + 1}"
         yield f"{cells}, {first}: overloads, which are no numbers and are left out"
 
 
-def _layout(table: Table, found: Headings, sections: Sequence[Section], offset: int) -> str:
-    """How the file was read, in words; `offset`: the lines above the text."""
-    first, last = sections[0].first + 1 + offset, sections[-1].last + 1 + offset
+def _layout(table: Table, found: Headings, sections: Sequence[Section]) -> str:
+    """How the file was read, in words."""
+    first, last = sections[0].first + 1, sections[-1].last + 1
     numbers = f"rows of {len(table.columns)} numbers from line {first} to {last}"
     written = f"separated by {_SEPARATOR_WORDS[table.separator]}, with decimal {_DECIMAL_WORDS[table.decimal]}"
     if not found.lines:
         return f"{numbers}, {written}; no names above them"
-    names, *units = [line + 1 + offset for line in found.lines]
+    names, *units = [line + 1 for line in found.lines]
     return f"{numbers}, {written}; names from line {names}" + "".join(f", units from line {line}" for line in units)
 
 

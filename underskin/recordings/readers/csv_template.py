@@ -246,7 +246,11 @@ class _Template:
         cell = row[1] if len(row) > 1 else ""
         if name == "sensor":
             values = [*row[1:], "", "", ""]
-            sensor = {key: self.value(key, values[column], (index, column + 1)) for column, key in enumerate(_SENSOR)}
+            sensor = {
+                key: self.value(key, values[column], (index, column + 1))
+                for column, key in enumerate(_SENSOR)
+                if values[column]
+            }
             return "sensor", name, sensor
         if name in ("schema", "name", "units_checked"):
             self._require_first(name, index)

@@ -14,7 +14,6 @@ from underskin import extensions
 from underskin.errors import FileError
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.readers import csv_template, lvm_file, text
-from underskin.recordings.readers import text as cut_end
 
 MODULES = {
     "JSON": "json_file",
@@ -171,7 +170,7 @@ def parse(name: str, stream: BinaryIO, file: str) -> Contents | Document:
         module = importlib.import_module(f"underskin.recordings.readers.{MODULES[name]}")
         content = module.read(stream, file)
         content = content if isinstance(content, Contents | Document) else Document(content)
-        cut = cut_end.warning(stream) if name in _TABLES else ""
+        cut = text.warning(stream) if name in _TABLES else ""
         return replace(content, warnings=(*content.warnings, cut)) if cut else content
     stream.seek(0)
     contents = formats_of_other_packages()[name].read(stream, file)

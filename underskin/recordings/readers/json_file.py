@@ -1,7 +1,6 @@
 """Campaigns as JSON (`campaign/1`), the format all others are converted to.
 
-Repeated keys of an object, of which parsers silently use the last, are rejected; the search jumps from one quotation
-mark to the next, so that the numbers between them cost little.
+Repeated keys of an object, of which parsers silently use the last, are rejected.
 """
 
 import json
@@ -13,10 +12,7 @@ import orjson
 from underskin.errors import FileError
 from underskin.recordings.campaign import Campaign, to_dict
 
-_ESCAPE = re.compile(rb'\\(["\\])')
-_AS_UNICODE = {b'"': rb"\u0022", b"\\": rb"\u005c"}
-_STRING = re.compile(rb'"((?:[^"\\]|\\.)*)"')
-_COLON = re.compile(rb"\s*:")
+_TOKEN = re.compile(rb'[^"{}]*+(?:([{}])|"((?:[^"\\]++|\\.)*+)"(\s*+:)?+|\Z)')
 
 
 def repeated_key(document: bytes) -> tuple[str, str] | None:
@@ -25,65 +21,23 @@ def repeated_key(document: bytes) -> tuple[str, str] | None:
 
     `document` must be valid JSON, in UTF-8, or in UTF-16 or UTF-32, which Python's own parser reads too.
     """
-    document = _in_utf8(document)
-    number = _number_of_repeated(document)
-    if number is None:
-        return None
-    string = next(match for index, match in enumerate(_STRING.finditer(document)) if index == number)
-    before = document[: string.start()].decode("utf-8", "replace")
-    line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-    return _unescaped(string[1]), f"line {line}, column {column}"
-
-
-def _in_utf8(document: bytes) -> bytes:
     encoding = json.detect_encoding(document)
-    if encoding == "utf-8":
-        return document
-    return document.decode(encoding, "surrogatepass").encode("utf-8", "surrogatepass")
-
-
-def _number_of_repeated(document: bytes) -> int | None:
-    """The index, from 0, of the string of the document that is the first repeated key."""
-    if b"\\" in document:  # replace quotation marks within strings
-        document = _ESCAPE.sub(lambda escape: _AS_UNICODE[escape[1]], document)
-    objects: list[set[bytes]] = []  # the keys of those that are open
-    number = behind = 0
-    while (start := document.find(b'"', behind)) >= 0:
-        if start - behind > 1 or not number:  # a single character is a colon or a comma
-            closed, opens = _braces(document, behind, start)
-            del objects[len(objects) - closed :]
-            if opens:
-                objects.append(set())
-        end = document.find(b'"', start + 1)
-        behind = end + 1
-        follows = document[behind : behind + 1]
-        if follows == b":" or (follows.isspace() and _COLON.match(document, behind)):
-            key = document[start + 1 : end]
-            if b"\\" in key:
-                key = _unescaped(key).encode("utf-8", "surrogatepass")
-            if key in objects[-1]:
-                return number
-            objects[-1].add(key)
-        number += 1
+    if encoding != "utf-8":
+        document = document.decode(encoding, "surrogatepass").encode("utf-8", "surrogatepass")
+    open_objects: list[set[str]] = []  # the keys of each
+    for token in _TOKEN.finditer(document):
+        brace, string, colon = token.groups()
+        if brace == b"{":
+            open_objects.append(set())
+        elif brace == b"}":
+            open_objects.pop()
+        elif colon is not None:
+            key = json.loads(b'"%b"' % string) if b"\\" in string else string.decode("utf-8", "surrogatepass")
+            if key in open_objects[-1]:
+                before = document[: token.start(2) - 1].decode("utf-8", "replace")
+                return key, f"line {before.count(chr(10)) + 1}, column {len(before) - before.rfind(chr(10))}"
+            open_objects[-1].add(key)
     return None
-
-
-def _braces(document: bytes, start: int, end: int) -> tuple[int, bool]:
-    """The number of open objects that the braces between two strings close, and whether they open one that stays open.
-
-    No object has a key between two strings, so that only the last brace can open one that stays open.
-    """
-    opening, closing = document.find(b"{", start, end), document.find(b"}", start, end)
-    if opening < 0 and closing < 0:
-        return 0, False
-    opened = document.count(b"{", opening, end) if opening >= 0 else 0
-    closed = document.count(b"}", closing, end) if closing >= 0 else 0
-    stays_open = document.rfind(b"{", start, end) > document.rfind(b"}", start, end)
-    return closed - opened + stays_open, stays_open
-
-
-def _unescaped(string: bytes) -> str:
-    return str(json.loads(b'"%b"' % string))
 
 
 _BOM = b"\xef\xbb\xbf"

@@ -13,7 +13,7 @@ import scipy.io
 
 from underskin.errors import FileError, damage_said
 from underskin.recordings.channels import Contents
-from underskin.recordings.readers import hdf5_file, variables
+from underskin.recordings.readers import hdf5_guard, variables
 
 MAGIC_73 = b"MATLAB 7.3 MAT-file"
 _EXPORTS = {"timetable": "writetimetable({0}, '{0}.csv')", "table": "writetable({0}, '{0}.csv')"}
@@ -27,7 +27,12 @@ def read(stream: BinaryIO, file: str) -> Contents:
     stream.seek(0)
     with damage_said(file, "", lambda error: f"no MATLAB file: {type(error).__name__}: {error}"):
         # SciPy's stubs accept paths only
-        stored = _variables_73(stream, file) if is_73 else scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]
+        if is_73:
+            with h5py.File(stream, "r") as source:
+                hdf5_guard.refuse_outside(source, file)
+                stored = _structure_73(source)
+        else:
+            stored = scipy.io.loadmat(stream, simplify_cells=True)  # type: ignore[arg-type]
     objects = dict(_objects(stored))
     numbers = {
         name: value for name, value in stored.items() if not name.startswith("__") and name not in (*objects, "None")
@@ -62,12 +67,6 @@ class _Object:
 
     def __init__(self, of_class: str) -> None:
         self.of_class = of_class
-
-
-def _variables_73(stream: BinaryIO, file: str) -> dict[str, Any]:
-    with h5py.File(stream, "r") as source:
-        hdf5_file.refuse_outside(source, file)
-        return _structure_73(source)
 
 
 def _structure_73(group: Any) -> dict[str, Any]:

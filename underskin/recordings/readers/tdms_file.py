@@ -78,7 +78,8 @@ def _block(group: TdmsGroup, about_file: Mapping[str, Any], file: str) -> Block:
     rate = rates.pop() if len(rates) == 1 else None
     others = (_moment(given) for given in (group.properties.get("DateTime"), about_file.get("DateTime")))
     start_time = min(known_starts) if known_starts else next((moment for moment in others if moment is not None), None)
-    return Block(group.name, with_distinct_names(channels), rate, None if start_time is None else _iso(start_time))
+    recorded_at = None if start_time is None else start_time.isoformat().replace("+00:00", "Z")
+    return Block(group.name, with_distinct_names(channels), rate, recorded_at)
 
 
 def _start(channel: TdmsChannel) -> datetime | None:
@@ -98,10 +99,6 @@ def _moment(given: Any) -> datetime | None:
     except OverflowError:
         return None
     return moment if moment.year >= FIRST_YEAR else None
-
-
-def _iso(moment: datetime) -> str:
-    return moment.isoformat().replace("+00:00", "Z")
 
 
 def _channel(channel: TdmsChannel, file: str) -> Channel:

@@ -15,15 +15,12 @@ import numpy as np
 import pyuff
 
 from underskin.errors import FileError, damage_said
-from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
-from underskin.units import Floats
+from underskin.recordings.channels import Block, Channel, Contents, some_of, with_distinct_names
 
 _FUNCTION = 58
 _FRF, _COHERENCE = 4, 6  # function types
 _FREEDOM = ("rsp_node", "rsp_dir", "ref_node", "ref_dir")
 _TIME, _FREQUENCY = 17, 18  # specific data types of the abscissa
-_MOST_NAMED = 5
-_END = b"-1"
 
 
 def read(stream: BinaryIO, file: str) -> Contents:
@@ -37,25 +34,24 @@ def read(stream: BinaryIO, file: str) -> Contents:
         raise FileError(file, "", f"holds no whole dataset {_FUNCTION}; its datasets: {types or 'none'}")
     if len(functions) < len(types):
         notes.append(f"datasets other than {_FUNCTION} are left out: {sorted(set(types) - {_FUNCTION})}")
-    frfs = [
-        function for function in functions if int(function["func_type"]) == _FRF and np.iscomplexobj(function["data"])
-    ]
+    frfs = [one for one in functions if int(one["func_type"]) == _FRF and np.iscomplexobj(one["data"])]
     if len(frfs) < 2:
         return Contents(_blocks(functions), {}, tuple(notes))
-    blocks, used = _separate_frfs(frfs, functions)
-    others = [function for function in functions if function["number"] not in used]
-    notes.append(f"holds {len(frfs)} FRFs, each a part of its own: {_some([name for name, _ in blocks])}")
-    properties = {f"{name}.{key}": value for name, frf in blocks for key, value in _about(frf).items()}
+    named = _with_coherence(frfs, functions)
+    notes.append(f"holds {len(frfs)} FRFs, each a part of its own: {some_of(list(named))}")
+    properties = {f"{name}.{key}": value for name, frf in named.items() for key, value in _about(frf).items()}
     one_unit = len({_unit(frf) for frf in frfs}) == 1
-    frf_blocks = tuple(_frf_block(name, frf, "FRF" if one_unit else f"FRF {_unit(frf)}") for name, frf in blocks)
-    return Contents((*frf_blocks, *_blocks(others)), properties, tuple(notes))
+    blocks = [_frf_block(name, frf, "FRF" if one_unit else f"FRF {_unit(frf)}") for name, frf in named.items()]
+    used = {one["number"] for frf in named.values() for one in (frf, frf["coherence"]) if one is not None}
+    others = [function for function in functions if function["number"] not in used]
+    return Contents((*blocks, *_blocks(others)), properties, tuple(notes))
 
 
 def _cut_off(stream: BinaryIO) -> list[str]:
     """A warning where the last dataset has no end."""
     size = stream.seek(0, os.SEEK_END)
     stream.seek(max(0, size - 200))
-    ended = stream.read().rstrip().endswith(_END)
+    ended = stream.read().rstrip().endswith(b"-1")
     stream.seek(0)
     return [] if ended else ["the last dataset has no end and is left out: the file is cut off"]
 
@@ -69,32 +65,21 @@ def _function(universal: Any, index: int, file: str) -> dict[str, Any]:
         announced, stored = int(function["num_pts"]), len(function["data"])
     if stored < announced or len(function["x"]) < announced or announced < 1:
         raise FileError(file, place, f"holds {stored} of the {announced} points that it announces")
-    return {**function, "x": function["x"][:announced], "data": function["data"][:announced], "number": index + 1}
+    columns = {name: function[name][:announced] for name in ("x", "data")}
+    return {**function, **columns, "number": index + 1, "axis": int(function["abscissa_spec_data_type"])}
 
 
-def _separate_frfs(
-    frfs: list[dict[str, Any]], functions: list[dict[str, Any]]
-) -> tuple[list[tuple[str, dict[str, Any]]], set[int]]:
-    """The FRFs with distinct names and their coherence, and the numbers of the datasets used."""
+def _with_coherence(frfs: list[dict[str, Any]], functions: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """The FRFs by distinct names, each with its coherence, the first of the same degrees of freedom, or None."""
     waiting = [function for function in functions if int(function["func_type"]) == _COHERENCE]
     named: dict[str, dict[str, Any]] = {}
-    used = set()
     for frf in frfs:
-        mate = next(
-            (
-                candidate
-                for candidate in waiting
-                if _freedom(candidate) == _freedom(frf) and _same_abscissa(candidate, frf)
-            ),
-            None,
-        )
-        if mate is not None:
-            waiting = [candidate for candidate in waiting if candidate is not mate]
-            used.add(mate["number"])
-        used.add(frf["number"])
+        alike = (one for one in waiting if _freedom(one) == _freedom(frf) and _same_abscissa(one, frf))
+        coherence = next(alike, None)
+        waiting = [one for one in waiting if one is not coherence]
         name = _name(frf)
-        named[name if name not in named else f"{name} (dataset {frf['number']})"] = {**frf, "coherence": mate}
-    return list(named.items()), used
+        named[name if name not in named else f"{name} (dataset {frf['number']})"] = {**frf, "coherence": coherence}
+    return named
 
 
 def _freedom(function: dict[str, Any]) -> tuple[int, ...]:
@@ -110,8 +95,7 @@ def _about(frf: dict[str, Any]) -> dict[str, str]:
 
 def _place(frf: dict[str, Any], of: str) -> str:
     """The entity's name of a node, or its number."""
-    entity = _text(frf[f"{of}_ent_name"])
-    return entity if entity else str(int(frf[f"{of}_node"]))
+    return _text(frf[f"{of}_ent_name"]) or str(int(frf[f"{of}_node"]))
 
 
 def _frf_block(name: str, frf: dict[str, Any], channel: str) -> Block:
@@ -124,41 +108,31 @@ def _frf_block(name: str, frf: dict[str, Any], channel: str) -> Block:
     return Block(name, tuple(channels))
 
 
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:_MOST_NAMED]) + (
-        f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
-    )
-
-
 def _blocks(functions: list[dict[str, Any]]) -> tuple[Block, ...]:
     together: list[list[dict[str, Any]]] = []
     for function in functions:
-        same = next((group for group in together if _same_abscissa(group[0], function)), [])
-        if not same:
-            together.append(same)
-        same.append(function)
-    return tuple(_block(group) for group in together)
+        same = next((group for group in together if _same_abscissa(group[0], function)), None)
+        if same is None:
+            together.append([function])
+        else:
+            same.append(function)
+    return tuple(map(_block, together))
 
 
 def _same_abscissa(first: dict[str, Any], second: dict[str, Any]) -> bool:
-    return _axis(first) == _axis(second) and np.array_equal(first["x"], second["x"])
-
-
-def _axis(function: dict[str, Any]) -> int:
-    return int(function["abscissa_spec_data_type"])
+    return bool(first["axis"] == second["axis"]) and np.array_equal(first["x"], second["x"])
 
 
 def _block(functions: list[dict[str, Any]]) -> Block:
     first = functions[0]
     channels = [Channel(_name(function), _unit(function), np.asarray(function["data"])) for function in functions]
     step = float(first["abscissa_inc"]) if first["abscissa_spacing"] == 1 else 0.0
-    if _axis(first) == _TIME and step > 0:
+    if first["axis"] == _TIME and step > 0:
         return Block(f"dataset {first['number']}", with_distinct_names(channels), 1 / step)
-    abscissa: Floats = np.asarray(first["x"], dtype=np.float64)
     names = {_TIME: "time", _FREQUENCY: "frequency"}
-    name = names.get(_axis(first)) or _text(first["abscissa_axis_lab"]) or "abscissa"
-    channels = [Channel(name, _text(first["abscissa_axis_units_lab"]), abscissa), *channels]
-    return Block(f"dataset {first['number']}", with_distinct_names(channels))
+    name = names.get(first["axis"]) or _text(first["abscissa_axis_lab"]) or "abscissa"
+    abscissa = Channel(name, _text(first["abscissa_axis_units_lab"]), np.asarray(first["x"], dtype=np.float64))
+    return Block(f"dataset {first['number']}", with_distinct_names([abscissa, *channels]))
 
 
 def _name(function: dict[str, Any]) -> str:

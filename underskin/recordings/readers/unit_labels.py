@@ -32,6 +32,8 @@ _SI_WORDS: Mapping[str, str] = {
     "A": "amps ampere amperes ampère ampères amperio amperios ампер",
 }
 _PREFIX_WORDS: Mapping[float, str] = {
+    1e-18: "atto",
+    1e-15: "femto",
     1e-12: "pico piko пико п 皮",
     1e-9: "nano нано н 纳",
     1e-6: "micro mikro микро мк 微",
@@ -45,7 +47,7 @@ _OTHERS: Mapping[tuple[str, float], str] = {
     ("force", POUND_FORCE): "lb lbs lbf lbsf lb-f pound pounds pound-force pounds-force pfund libra libras livre "
     "livres",
     ("force", POUND_FORCE / 16): "oz ozf ounce ounces",
-    ("force", 1e-5): "dyne dynes",
+    ("force", 1e-5): "dyne dynes dyn",
     ("force", STANDARD_GRAVITY): "kg kgf kp kilopond kilogram kilograms kilogram-force kilogramm",
     ("force", GRAM_FORCE): "gf gram grams gramm gram-force pond",
     ("length", _INCH): "in inch inches zoll pouce pouces pulgada pulgadas pollice pollici",
@@ -67,8 +69,10 @@ _OTHERS: Mapping[tuple[str, float], str] = {
     ("voltage", 1e-3): "мв",
     ("pressure", 1e6): "мпа",
     ("length", 1e-10): "å angstrom angstroms",
+    ("frequency", 1.0): "cps",
     ("frequency", 1 / 60): "rpm r/min cpm 1/min",
     ("angle", 1.0): "rad rads radian radians radiant",
+    ("angle", 1e3): "krad",
     ("angle", 1e-3): "mrad milliradian milliradians",
     ("angle", 6.283185307179586): "rev revs revolutions turns cycles",
     ("angle", 3.141592653589793 / 180): "deg degs degree degrees grad ° degré degrés gradi grado grados",
@@ -76,7 +80,13 @@ _OTHERS: Mapping[tuple[str, float], str] = {
 DECIBEL = "decibel"  # the dimension of a logarithm, which no field has
 
 
-_PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+_PREFIXES = {
+    "": 1.0, "a": 1e-18, "f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2,
+    "d": 1e-1, "da": 1e1, "h": 1e2, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12,
+}  # fmt: skip
+_ELECTRIC, _MECHANICAL = ("C", "V", "A", "N"), ("N", "Pa", "m")
+# Prefixes of some units alone: "fs" is a sampling rate, and "as" and "am" are words
+_ONLY_OF = {"a": _ELECTRIC, "f": _ELECTRIC, **dict.fromkeys(("c", "d", "da", "h"), _MECHANICAL), "T": ("Pa", "Hz")}
 _BASES = {
     "m": "length",
     "N": "force",
@@ -91,20 +101,15 @@ _GRAM_FORCE = ("force", GRAM_FORCE)  # g of a load cell
 _ROUNDING = 1e-9  # relative, of quotients of prefixes
 _LONGEST = 40
 _NO_UNITS = ("n/a",)  # although either side is one
+_NEWTONS = {"mN": 1e-3, "N": 1.0, "kN": 1e3, "MN": 1e6}
 _COMPOUND_UNITS = {
-    "cm": ("length", 1e-2),
-    "dm": ("length", 1e-1),
-    "daN": ("force", 10.0),
-    "dN": ("force", 1e-1),
-    "cN": ("force", 1e-2),
-    "hPa": ("pressure", 1e2),
     "m/s^2": ("acceleration", 1.0),
     "m/s2": ("acceleration", 1.0),
     "g": ("acceleration", STANDARD_GRAVITY),
     **{
-        f"{force}N/{length}{mark}2": ("pressure", size / area)
-        for force, size in (("", 1.0), ("k", 1e3))
-        for length, area in (("m", 1.0), ("cm", 1e-4), ("mm", 1e-6))
+        f"{force}/{length}{mark}2": ("pressure", size / side**2)
+        for force, size in {**_NEWTONS, "kgf": STANDARD_GRAVITY, "lbf": POUND_FORCE}.items()
+        for length, side in (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("in", _INCH))
         for mark in ("", "^")
     },
 }
@@ -128,7 +133,7 @@ _LEAD = re.compile(r"(?i:in|units?|einheit)(\s*[:=]\s*|\s+)(?=\S)")
 _AMPLITUDE = re.compile(r"[\s,_]*(?i:rms|peak|pk|pk-pk|p-?p|eff)\.?$")
 _STATISTIC = re.compile(r"(?i)(?<![a-z])(?:(rms|rqs|eff)|(p-?p|p2p|pk-?pk|peak.to.peak)|(peak|pk))(?![a-z])")
 _OVER = re.compile(r"\s+(?i:per|pro|par|por)\s+")
-_RECIPROCAL = re.compile(r"\s*[·*⋅ ]\s*\(?([^\s·*⋅^()]+?)\)?\^?[-−]1$")
+_RECIPROCAL = re.compile(r"\s*[·*⋅. ]\s*\(?([^\s·*⋅^()]+?)\)?\^?[-−]1$")
 _BEHIND = re.compile(r"(?P<name>.*[^\s,:])(\s*/\s*|\s+in\s+|\s*[,:]\s*)(?P<unit>[^\s/,]+(/[^\s/,]+)?)\s*")
 _LAST_WORD = re.compile(r".*\S\s+(?P<unit>\S{2,})")
 _NO_LAST_WORD = ("in", "min", "mins", "bar", "mil", "foot", "grad", "second", "seconde", "secondo", "segundo", "hour")
@@ -171,16 +176,20 @@ def _meanings(label: str) -> tuple[Unit, ...]:
         return (single,)
     for above, below in _fractions(label):
         both = product(meanings(above), meanings(below))
-        ratios = [
-            Unit(f"{numerator.dimension}/{denominator.dimension}", numerator.to_si / denominator.to_si)
-            for numerator, denominator in both
-        ]
+        ratios = [_ratio(numerator, denominator) for numerator, denominator in both]
         if ratios:
             return tuple(dict.fromkeys(ratios))
     without = _AMPLITUDE.sub("", label)
     if without and without != label:
         return meanings(without)
     return _in_other_letters(label)
+
+
+def _ratio(above: Unit, below: Unit) -> Unit:
+    """The unit of a quotient; an angle over a time is a frequency, of whole turns."""
+    if (above.dimension, below.dimension) == ("angle", "time"):
+        return Unit("frequency", above.to_si / (2 * math.pi * below.to_si))
+    return Unit(f"{above.dimension}/{below.dimension}", above.to_si / below.to_si)
 
 
 def decibel_reference(label: str) -> str | None:
@@ -195,7 +204,7 @@ def _single(label: str) -> Unit | None:
         return Unit(*_COMPOUND_UNITS[label])
     for base, dimension in _BASES.items():
         prefix = label.removesuffix(base)
-        if prefix != label and prefix in _PREFIXES:
+        if prefix != label and prefix in _PREFIXES and base in _ONLY_OF.get(prefix, _BASES):
             return Unit(dimension, _PREFIXES[prefix])
     word = _WORDS.get(label.casefold())
     return None if word is None else Unit(*word)

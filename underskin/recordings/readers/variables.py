@@ -14,12 +14,19 @@ from typing import Any
 import numpy as np
 
 from underskin.errors import FileError
-from underskin.recordings.channels import Block, Channel, Contents, TextColumn, as_values, with_distinct_names
+from underskin.recordings.channels import (
+    Block,
+    Channel,
+    Contents,
+    TextColumn,
+    as_values,
+    some_of,
+    with_distinct_names,
+)
 from underskin.recordings.readers.unit_labels import unit
 
 MOST_COLUMNS = 1000  # of a matrix
 _DEEPEST = 8  # structures in structures
-_MOST_NAMED = 5
 _NUMBERS = "iufc"
 
 
@@ -47,9 +54,8 @@ def contents(variables: Mapping[str, Any], file: str) -> Contents:
     found = _Found()
     _walk(variables, "", 0, found, file)
     signals = [_signals(axis, held, len(found.signals) > 1) for axis, held in found.signals.items()]
-    several = f" and {len(found.left_out) - _MOST_NAMED} more" if len(found.left_out) > _MOST_NAMED else ""
-    named = ", ".join(map(repr, found.left_out[:_MOST_NAMED]))
-    warnings = (f"{named}{several}: no numbers of one or two axes, left out",) if named else ()
+    named = some_of(list(map(repr, found.left_out)))
+    warnings = (f"{named}: no numbers of one or two axes, left out",) if named else ()
     return Contents((*found.blocks, *signals), found.properties, warnings)
 
 

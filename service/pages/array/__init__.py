@@ -1,1 +1,0 @@
-"""The pages of an array under loads or under a map of pressure."""

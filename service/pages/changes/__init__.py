@@ -1,1 +1,0 @@
-"""Changes of campaigns and skins, taken back."""

@@ -1,1 +1,0 @@
-"""Two campaigns side by side."""

@@ -1,1 +1,0 @@
-"""The pages of a diagnosis and of the next experiment."""

@@ -1,1 +1,0 @@
-"""The documentation on the server."""

@@ -1,1 +1,0 @@
-"""The page of fleets: skins of one make."""

@@ -1,1 +1,0 @@
-"""The page of single measured values of the FRF."""

@@ -1,1 +1,0 @@
-"""The start page, the example skin, and logging in."""
