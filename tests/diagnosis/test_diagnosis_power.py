@@ -92,7 +92,7 @@ def test_a_quiet_report_says_what_would_have_shown(table: SigmaTable) -> None:
 def test_curve_shows_what_is_not_noise() -> None:
     """A curve that shows a modulus wrong by less than usual does not say that such a one stays within the noise."""
     depth = ways(-0.1, 0.3, -0.1)
-    report = quick_diagnosis(of_curve(depth, pressed(depth), skin={"youngs_modulus_mpa": 1.0})).document
+    report = dict(quick_diagnosis(of_curve(depth, pressed(depth), skin={"youngs_modulus_mpa": 1.0})).document)
     within_noise = {entry["mechanism"] for entry in report["not_identifiable"] if entry["confounded_with"] == "noise"}
     assert visible(report)["modulus_error"] < 15.0
     assert "modulus_error" not in within_noise
