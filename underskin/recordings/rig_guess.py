@@ -7,6 +7,7 @@ called alike but for their first word (`s01 |H|`, `s01 phase`, `s02 |H|`, …) a
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -389,15 +390,11 @@ def _of_skin(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
 def _time_stated(properties: Mapping[str, Any]) -> str | None:
     """The property of a file with its time of recording; None if no usable one exists."""
     by_name = {name.lower().replace("_", " ").strip(): name for name in properties}
-    return next((by_name[name] for name in TIMES if name in by_name and _is_time(properties[by_name[name]])), None)
-
-
-def _is_time(value: Any) -> bool:
-    try:
-        with_zone(str(value), time_zone())
-    except ValueError:
-        return False
-    return True
+    for name in (by_name[words] for words in TIMES if words in by_name):
+        with suppress(ValueError):
+            with_zone(str(properties[name]), time_zone())
+            return name
+    return None
 
 
 def _with_spring(channels: dict[str, Any], columns: Sequence[Column], properties: Mapping[str, Any]) -> dict[str, Any]:

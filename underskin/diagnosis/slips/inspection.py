@@ -169,16 +169,15 @@ def _without_copies(recordings: list[FrfRecording]) -> tuple[list[FrfRecording],
     """The recordings without copies, whose lines agree but for rounding; compared if their means nearly agree."""
     lines = [np.nan_to_num(lines_of(recording).values) for recording in recordings]
     size = np.array([float(np.abs(values).mean()) for values in lines])
-    originals, findings = list[int](), list[Finding]()
+    is_copy, findings = np.zeros(len(recordings), dtype=bool), list[Finding]()
     for index, recording in enumerate(recordings):
-        near = (first for first in originals if abs(size[index] - size[first]) <= _SAME * size[index])
-        original = next((first for first in near if _alike(lines[first], lines[index])), None)
-        if original is None:
-            originals.append(index)
-        else:
+        near = ~is_copy[:index] & (np.abs(size[:index] - size[index]) <= _SAME * size[index])
+        original = next((first for first in np.flatnonzero(near) if _alike(lines[first], lines[index])), None)
+        if original is not None:
+            is_copy[index] = True
             arguments = {"original": recordings[original].id}
             findings.append(Finding(Reason.DUPLICATED_RECORDING, recording.id, _FIELD, arguments))
-    return [recordings[index] for index in originals], findings
+    return [recording for recording, copied in zip(recordings, is_copy, strict=True) if not copied], findings
 
 
 def _alike(first: Complexes, second: Complexes) -> bool:

@@ -294,16 +294,13 @@ def _properties(lines: Iterable[str], table: Table) -> tuple[dict[str, str | flo
         stated = _stated(tables.uncommented(line).strip(), table)
         if stated is not None:
             values.setdefault(stated[0], []).extend(text.with_day_first(stated[1:], table.decimal))
-    ambiguous = {
-        name: different
-        for name, stated_values in values.items()
-        if len(different := list(dict.fromkeys(stated_values))) > 1
-    }
+    different = {name: list(dict.fromkeys(given)) for name, given in values.items()}
     doubts = [
-        f"{name!r} is given as {first!r} and as {second!r}: neither is used"
-        for name, (first, second, *_) in ambiguous.items()
+        f"{name!r} is given as {given[0]!r} and as {given[1]!r}: neither is used"
+        for name, given in different.items()
+        if len(given) > 1
     ]
-    return {name: stated_values[0] for name, stated_values in values.items() if name not in ambiguous}, doubts
+    return {name: given[0] for name, given in different.items() if len(given) == 1}, doubts
 
 
 def _stated(line: str, table: Table) -> tuple[str, str] | None:

@@ -42,10 +42,6 @@ class _Candidate:
     label: str  # "units", "names", or none
     is_next: bool  # to the numbers, but for blank lines and a line of units
 
-    def is_sure(self) -> bool:
-        """Whether it holds names by more evidence than the number of its cells."""
-        return self.label == "names" or any(unit(labelled_unit(cell)) is not None for cell in self.cells)
-
     def is_units(self) -> bool:
         """Whether it holds units: some of them, among other words, by more than a letter, which may be a symbol."""
         units = [without_brackets(cell) for cell in self.cells]
@@ -121,8 +117,10 @@ def _names(candidates: Sequence[_Candidate], units: _Candidate | None, lines: Se
     words = [candidate for candidate in candidates if not candidate.holds_value()]
     if words and words[0].is_next and not words[0].label:
         return words[0]
-    sure = (candidate for candidate in words if candidate.is_sure())
-    return next(sure, next(iter(words), next(iter(candidates), None)))
+    for candidate in words:  # the number of cells alone is little evidence
+        if candidate.label == "names" or any(unit(labelled_unit(cell)) is not None for cell in candidate.cells):
+            return candidate
+    return next(iter(words), next(iter(candidates), None))
 
 
 def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:

@@ -68,19 +68,16 @@ def _walk(structure: Mapping[str, Any], path: str, depth: int, found: _Found, fi
     for name, given in structure.items():
         here = f"{path}.{name}" if path else name
         value, label = (given.values, given.unit) if isinstance(given, Labelled) else (given, "")
-        if isinstance(value, Mapping):
-            inner.append((here, value))
-        elif isinstance(value, str):
-            found.properties[here] = value
-        elif isinstance(value, bool | int | float | np.number):
-            found.properties[here] = float(np.real(value))
-        elif not isinstance(value, np.ndarray | list) or not _add_array(
-            # lists are cells, with structures among them
-            np.asarray(value, dtype=object if isinstance(value, list) else None),
-            Channel(name, label, np.zeros(0)),
-            here,
-            (channels, texts, inner),
-        ):
+        if parts := _structures(here, value):
+            inner += parts
+        elif isinstance(value, str | bool | int | float | np.number):
+            found.properties[here] = value if isinstance(value, str) else float(np.real(value))
+        elif _are_all(value, str):
+            different, codes = np.unique(np.asarray(value, dtype=str), return_inverse=True)
+            texts.append(TextColumn(name, tuple(different.tolist()), codes))
+        elif isinstance(value, np.ndarray) and (columns := list(_columns(name, label, value))):
+            channels += columns
+        else:
             found.left_out.append(here)
     if channels:
         found.blocks.append(Block(path, with_distinct_names(channels), texts=tuple(texts)))
@@ -89,23 +86,20 @@ def _walk(structure: Mapping[str, Any], path: str, depth: int, found: _Found, fi
             _walk(part, here, depth + 1, found, file)
 
 
-_Lists = tuple[list[Channel], list[TextColumn], list[tuple[str, Mapping[str, Any]]]]
+def _structures(name: str, value: Any) -> list[tuple[str, Mapping[str, Any]]]:
+    """The structures of a value that is one, or a list of them, by their names; none of another."""
+    if isinstance(value, Mapping):
+        return [(name, value)]
+    numbered = enumerate(value, start=1) if _are_all(value, Mapping) else ()
+    return [(f"{name}({number})", part) for number, part in numbered]
 
 
-def _add_array(array: Any, channel: Channel, here: str, lists: _Lists) -> bool:
-    """Add what an array holds, under the name and unit of a channel, to one of the lists; whether it can be used."""
-    channels, texts, inner = lists
-    if array.ndim == 1 and len(array) and array.dtype.kind in "UO":
-        if all(isinstance(part, Mapping) for part in array):
-            inner += [(f"{here}({number})", part) for number, part in enumerate(array, start=1)]
-            return True
-        if all(isinstance(part, str) for part in array):
-            different, codes = np.unique(array.astype(str), return_inverse=True)
-            texts.append(TextColumn(channel.name, tuple(different.tolist()), codes))
-            return True
-    columns = list(_columns(channel.name, channel.unit, array))
-    channels += columns
-    return bool(columns)
+def _are_all(value: Any, kind: type) -> bool:
+    """Whether a value is a list, as of cells, or an array with one axis, of parts of this kind alone."""
+    is_list = isinstance(value, list) or (
+        isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "UO"
+    )
+    return is_list and len(value) > 0 and all(isinstance(part, kind) for part in value)
 
 
 def _columns(name: str, label: str, array: Any) -> Iterator[Channel]:
