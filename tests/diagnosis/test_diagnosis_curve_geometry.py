@@ -209,6 +209,17 @@ def test_a_wrong_thickness_is_a_rival_of_stiffening(true_mm: float, declared_mm:
     assert any(finding.code == "thickness_differs" for finding in report.findings)
 
 
+def test_a_thickness_declared_far_too_thick_to_show_is_no_rival() -> None:
+    """A stage that gives under a sphere on a deep block: a layer fifty times thinner than declared would bend the curve
+    as much, but nobody declares that, and the declared layer is no less probable than the half space."""
+    depth = ways(-0.02, 0.08, samples=400)
+    force = pressed(depth, lambda d: 4 / 3 / 0.75 * 2.0**0.5 * d**1.5)
+    travel = depth + force / 2.0
+    report = diagnosed(campaign(travel, force, timed=False, skin={"thickness_mm": 60.0}))
+    assert "instrument compliance" in str(report.headline).lower()
+    assert not any(finding.code == "thickness_differs" for finding in report.findings), report.statement
+
+
 def test_a_curve_from_its_deepest_sample_on_has_its_zero_in_the_air() -> None:
     """Held, drawn back into the air and pressed again, no deeper: the force of the first sample is no zero."""
     depth = np.concatenate([np.full(60, 0.3), ways(0.3, -0.05, 0.2995, samples=300)])

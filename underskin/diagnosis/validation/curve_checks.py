@@ -12,10 +12,11 @@ of which a poor one, whose scatter few curves underestimate, has up to 2.5 times
 well: those of one silicone, ten each of three, scatter by 3 to 8 %.
 
 Thickness. A layer of another thickness is a rival like a mechanism more: its thickness is a parameter, as where none is
-declared, with the prior of one mechanism. It is reported where that is not clearly less probable than the answer, its
-95 % interval excludes the declared value: a wrong thickness and a sample that stiffens with strain look much alike. It
-is not where it changes neither mechanisms nor modulus: some percent of thickness make up for what a contact law
-idealises. That the declared layer's law was tried, and is clearly less probable, is reported as well.
+declared, with the prior of one mechanism, and about the declared one with that of `thickness_error`. It is reported
+where that is not clearly less probable than the answer, its 95 % interval excludes the declared value: a wrong
+thickness and a sample that stiffens with strain look much alike. It is not where it changes neither mechanisms nor
+modulus: some percent of thickness make up for what a contact law idealises. That the declared layer's law was tried,
+and is clearly less probable, is reported as well.
 
 Unlisted laws. An imitated law acts as listed ones do: it multiplies the force, shifts the travel or adds a force, by a
 simple form of the force, the depth, the time or the way back. Each is given the strength that the explanation's own
@@ -48,9 +49,11 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import times_in_words
 from underskin.inversion.mixed_model import GAIN_RANGE, SDS_OF_95
+from underskin.mechanisms.base import Normal
 from underskin.mechanisms.laws.layered_contact import LayeredContact
 from underskin.mechanisms.laws.platen_friction import PlatenFriction, distinct_shapes
 from underskin.mechanisms.laws.strain_stiffening import StrainStiffening
+from underskin.mechanisms.laws.thickness_error import ThicknessError
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import Campaign, CurveConditions, CurveRecording, IndentationRecording
@@ -197,12 +200,18 @@ def thickness_findings(
     stated = result.fit_behind(result.answers[0])
     least, weight = least_evidence(stated), result.log_weight(stated)
     findings = []
-    layers = [weight - result.log_weight(fit) for fit in result.explanations if _LAYER in fit.names]
-    if layers and min(layers) > least:
-        arguments = {"declared_mm": declared, "less": times_in_words(min(layers))}
+    layer = problem.explain(
+        Request(tuple(name for name in named if name in {_LAYER, *stated.names}), never_pruned=True)
+    )
+    less = 0.0 if layer is None else weight - result.log_weight(layer)
+    if less > least:
+        arguments = {"declared_mm": declared, "less": times_in_words(less)}
         findings.append(Finding(Reason.DECLARED_LAYER, "", "thickness_mm", arguments))
     fits = _of_any_thickness(campaign, problem, [name for name in stated.names if name in named])
-    gains = [fit.log_evidence + log_prior_of(fit, result.supported) - weight for fit in fits]
+    gains = [
+        fit.log_evidence + _log_declared_prior(fit, declared) + log_prior_of(fit, result.supported) - weight
+        for fit in fits
+    ]
     for fit, gain in sorted(zip(fits, gains, strict=True), key=lambda pair: -pair[1])[:1]:
         low, value, high = _thickness(fit)
         modulus_mpa = _modulus(campaign, fit)
@@ -238,6 +247,18 @@ def _thickness(fit: Explanation) -> tuple[float, float, float]:
     parameter = fit.model.parameters[index]
     low, value, high = (parameter.from_fit(float(end)) for end in (at - half, at, at + half))
     return low, value, high
+
+
+def _log_declared_prior(fit: Explanation, declared_mm: float) -> float:
+    """The logarithm of the prior of a thickness beside a declared one, that of `thickness_error`, over the prior under
+    which it was fitted."""
+    index = fit.spans[_LAYER].start
+    at, fitted = float(fit.point.fit[index]), fit.model.parameters[index].prior
+    declared = ThicknessError.parameters_stated[0].prior
+    assert isinstance(fitted, Normal)
+    assert isinstance(declared, Normal)
+    off = at - float(np.log(declared_mm))
+    return declared.log_height + declared.log_shape(off) - fitted.log_height - fitted.log_shape(at)
 
 
 def _modulus(campaign: Campaign, fit: Explanation) -> float:
