@@ -39,17 +39,21 @@ def covered(estimate: Estimate | None, truth_pc_per_n: Floats) -> Floats:
     return np.asarray((estimate.low <= truth) & (truth <= estimate.high), dtype=float)
 
 
-def moved(campaign: Campaign, row: int, **changes: Any) -> Campaign:
-    recording = replace(campaign.recordings[row], **changes)
-    return replace(campaign, recordings=(*campaign.recordings[:row], recording, *campaign.recordings[row + 1 :]))
-
-
 def times(recording: FrfRecording, factor: complex | Floats | Complexes) -> FrfRecording:
     """The recording with its FRF times this."""
     value = factor * (np.asarray(recording.frf_re_pc_per_n) + 1j * np.asarray(recording.frf_im_pc_per_n))
     return replace(recording, frf_re_pc_per_n=value.real, frf_im_pc_per_n=value.imag)
 
 
+def moved(campaign: Campaign, row: int, **changes: Any) -> Campaign:
+    recording = replace(campaign.recordings[row], **changes)
+    return replace(campaign, recordings=(*campaign.recordings[:row], recording, *campaign.recordings[row + 1 :]))
+
+
 def scaled(campaign: Campaign, row: int, factor: float) -> Campaign:
-    changed = times(campaign.of(FrfRecording)[row], factor)
-    return moved(campaign, row, frf_re_pc_per_n=changed.frf_re_pc_per_n, frf_im_pc_per_n=changed.frf_im_pc_per_n)
+    recording = campaign.recordings[row]
+    assert isinstance(recording, FrfRecording)
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    real, imaginary = factor * recording.frf_re_pc_per_n, factor * recording.frf_im_pc_per_n
+    return moved(campaign, row, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
