@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.support.blocks import sample
+from tests.support.cases import first
 from underskin.errors import InvalidInput
 from underskin.inversion.elastomer import of_campaign
 from underskin.recordings.block_modulus import CompressionModulus, compression_modulus
@@ -102,7 +103,7 @@ def test_silicones_under_compression(product: str, modulus_kpa: float) -> None:
     that follow the neo-Hookean law there, over its mean slope, 1.13."""
     files = sorted((Path(os.environ["UNDERSKIN_RECORDINGS"]) / "silicone-compression" / product).glob("*.csv"))
     found = []
-    for file in files:
+    for file in first(4, files):
         table = np.loadtxt(file, delimiter=",", skiprows=8)
         found.append(compression_modulus(table[:, 1] * 1e-3, table[:, 2], 30e-3, 50e-3))
     assert len(files) == 10
