@@ -90,7 +90,6 @@ def test_modulus_of_a_relaxation_at_the_foot(table: SigmaTable) -> None:
     assert modulus["low"] < MODULUS_MPA < modulus["high"]
 
 
-@pytest.mark.slow
 def test_stiffening_with_strain_is_as_likely_as_with_the_invariant(table: SigmaTable) -> None:
     """Of a modulus that grows with the contact's strain the exponent is 1, or else E takes up a tenth of it."""
     campaign = parse(campaign_of_curves(*drawn_curves(51764, 10, INDENTATION, "single")))

@@ -11,6 +11,7 @@ import underskin
 from bench.soak import SOAK
 from tests.mechanisms.contact_elements import Body, force_of_elements
 from tests.recordings.test_sphere_modulus import bonded_layer, whole_sphere
+from tests.support.blocks import sample
 from tests.support.cases import first
 from tests.support.lean_reports import beside
 from tests.support.lean_reports import quick_diagnosis as diagnosed
@@ -29,19 +30,7 @@ def modulus_mpa(report: underskin.Report) -> float:
 
 def block(strain: Floats, stress_mpa: Floats) -> underskin.Campaign:
     """A cylinder of 10 by 10 mm; compression positive."""
-    curve = {
-        "id": "b1",
-        "kind": "compression",
-        "sample_height_mm": 10.0,
-        "sample_diameter_mm": 10.0,
-        "displacement_mm": (10 * strain).tolist(),
-        "force_n": (np.pi / 4 * 100 * stress_mpa).tolist(),
-    }
-    read, problems = from_dict(
-        {"schema": "campaign/1", "name": "block", "skin": {"poisson_ratio": 0.5}, "recordings": [curve]}
-    )
-    assert problems == []
-    return read
+    return sample(10 * strain, np.pi / 4 * 100 * stress_mpa)
 
 
 def neo_hookean(strain: Floats, noise: float = 1e-3) -> Floats:
@@ -144,9 +133,9 @@ def test_relaxed_sample_on_its_way_back(largest: float, fraction: float, seconds
     strain = largest * (1 - np.abs(time / 10 - 1))
     elastic = neo_hookean(strain, noise=0.0)
     lost, relaxed = 0.0, np.zeros(len(time))
-    for sample, step in enumerate(np.diff(time, prepend=0.0)):  # d lost/dt = (elastic - lost)/seconds
-        lost += (elastic[sample] - lost) * step / (seconds + step / 2)
-        relaxed[sample] = elastic[sample] - fraction * lost
+    for number, step in enumerate(np.diff(time, prepend=0.0)):  # d lost/dt = (elastic - lost)/seconds
+        lost += (elastic[number] - lost) * step / (seconds + step / 2)
+        relaxed[number] = elastic[number] - fraction * lost
     loaded = np.sign(largest) * relaxed > 0
     force = relaxed if glued else np.where(loaded, relaxed, 0.0)
     assert loaded[:2000].mean() > 0.99

@@ -18,6 +18,7 @@ from rig.description import parse as experiment
 from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves, record_curves
+from tests.support.blocks import sample
 from tests.support.cases import first
 from tests.support.lean_reports import beside, lean_report
 from tests.support.pressed_curves import pressed
@@ -229,12 +230,8 @@ def test_friction_at_the_platens_is_told_from_the_modulus_by_two_shapes_alone(ta
 def test_a_curve_without_noise_agrees_with_its_law(table: SigmaTable) -> None:
     """Errors of rounding in the likelihood of an exact curve speak for no mechanism."""
     depth = np.linspace(0.0, 0.2, 200)
-    press = {
-        "id": "exact", "kind": "indentation", "indenter_radius_mm": 5.0, "displacement_mm": depth.tolist(),
-        "force_n": (40 / 3 / 0.75 * np.sqrt(5.0) * depth**1.5).tolist(), "time_s": (0.1 * np.arange(200)).tolist(),
-    }  # fmt: skip
-    campaign = {"schema": "campaign/1", "name": "exact", "skin": {"poisson_ratio": 0.5}, "recordings": [press]}
-    report = underskin.diagnose(parse(campaign), table)
+    exact = IndentationRecording("exact", 5.0, depth, hertz(depth, modulus=10.0), time_s=0.1 * np.arange(200.0))
+    report = underskin.diagnose(Campaign("exact", SkinDescription(poisson_ratio=0.5), (exact,)), table)
     assert report.verdict == "no_mismatch", report.statement
 
 
@@ -244,13 +241,8 @@ def test_a_strip_is_called_softer_only_where_it_is(table: SigmaTable) -> None:
     random, stretch = np.random.default_rng(1), np.linspace(1.0, 2.2, 160)
     invariant = stretch**2 + 2 / stretch - 3
     force = -9 * np.pi / 3 * (stretch - stretch**-2) * (0.7 + 0.3 / stretch + 0.05 * invariant**2)
-    strip = {
-        "id": "strip", "kind": "compression", "sample_height_mm": 20.0, "sample_diameter_mm": 6.0,
-        "displacement_mm": (20 * (1 - stretch)).tolist(),
-        "force_n": (force + 2e-3 * np.abs(force).max() * random.normal(size=160)).tolist(),
-    }  # fmt: skip
-    campaign = {"schema": "campaign/1", "name": "strip", "skin": {"poisson_ratio": 0.5}, "recordings": [strip]}
-    report = underskin.diagnose(parse(campaign), table)
+    force += 2e-3 * np.abs(force).max() * random.normal(size=160)
+    report = underskin.diagnose(sample(20 * (1 - stretch), force, height_mm=20.0, diameter_mm=6.0), table)
     words = r"force over that of a neo-Hookean solid is ([\d.]+) at (\d+) % strain and ([\d.]+) at 118 % strain"
     said = re.search(words, report.statement)
     assert said, report.statement

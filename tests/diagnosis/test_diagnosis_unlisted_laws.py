@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from bench.soak import SOAK
+from rig.draw import drawn, record
+from rig.recorded import campaign as recorded
 from rig.unlisted.campaign import as_json, draw
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.lean_reports import beside, lean_report, whole_report
-from tests.support.rig_reports import rig_report
 from underskin.mechanisms import CATALOGUE
 from underskin.prediction.adopted_model import adopted, not_adopted
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_of, frf_recordings, parse
@@ -25,6 +26,31 @@ pytestmark = pytest.mark.slow
 
 # What would hide the least of what these campaigns hold
 FEW = beside("sensor_spread", "ageing", "modulus_error", "thickness_error", "misalignment", "preload_dependent_d33")
+
+
+def rig_report(
+    table: SigmaTable, effects: dict[str, Any], *left_out: str, gain: float = 0.02, position_mm: float = 0.0
+) -> dict[str, Any]:
+    """The report on three sensors of the virtual rig, pressed at four places each, in any order; searched
+    outside `make soak` without the mechanisms left out."""
+    description = drawn(5, 0, "none")
+    description["skin"] = {
+        "thickness_mm": 2.0,
+        "youngs_modulus_mpa": 3.0,
+        "sensor_radius_mm": 1.0,
+        "d33_pc_per_n": 15.0,
+        "array": {"columns": 3, "rows": 1, "pitch_mm": 8.0},
+    }
+    description["design"] = {
+        "indenters_mm": [4.0],
+        "preloads_n": [0.4, 0.8, 1.6, 3.0],
+        "dynamic_forces_n": [0.05],
+        "offsets_mm": [[0.0, 0.0], [0.8, 0.0], [0.0, -1.2], [-1.5, 0.6]],
+        "shuffled": True,
+    }
+    description["noise"] |= {"gain": gain, "position_mm": position_mm}
+    description["effects"] = effects
+    return lean_report(parse(recorded(record(description))), table, *left_out)
 
 
 def reported(made: Campaign, table: SigmaTable) -> dict[str, Any]:

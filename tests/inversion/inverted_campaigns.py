@@ -8,7 +8,7 @@ import numpy as np
 from tests.support.simulated_campaign import LARGEST_SCATTER_MM, Rig
 from underskin.inversion.mixed_model import Estimate
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.units import Floats
+from underskin.units import Complexes, Floats
 
 
 def drawn(random: np.random.Generator) -> tuple[Rig, float]:
@@ -32,9 +32,17 @@ def drawn(random: np.random.Generator) -> tuple[Rig, float]:
     return rig, array if count > 1 else float(d33[0])
 
 
-def covered(estimate: Estimate, truth_pc_per_n: Floats) -> Floats:
+def covered(estimate: Estimate | None, truth_pc_per_n: Floats) -> Floats:
+    """Of each true d33 whether the interval holds it; an estimate that is not given fails."""
+    assert estimate is not None
     truth = truth_pc_per_n * 1e-12
     return np.asarray((estimate.low <= truth) & (truth <= estimate.high), dtype=float)
+
+
+def times(recording: FrfRecording, factor: complex | Floats | Complexes) -> FrfRecording:
+    """The recording with its FRF times this."""
+    value = factor * (np.asarray(recording.frf_re_pc_per_n) + 1j * np.asarray(recording.frf_im_pc_per_n))
+    return replace(recording, frf_re_pc_per_n=value.real, frf_im_pc_per_n=value.imag)
 
 
 def moved(campaign: Campaign, row: int, **changes: Any) -> Campaign:

@@ -40,7 +40,6 @@ def test_a_skin_within_its_tolerances_is_covered(table: SigmaTable) -> None:
             youngs_modulus_mpa=skin.youngs_modulus_mpa * off[2],
         )
         found = invert(replace(campaign, skin=declared), table).absolute_d33
-        assert found is not None
         within.append(bool(covered(found, np.array(14.0))))
     assert 0.88 <= np.mean(within) <= 1.0
 

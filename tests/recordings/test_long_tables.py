@@ -10,18 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.support.campaign_documents import SKIN
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import Reading, read_file, rig_description
 from underskin.recordings.campaign import FrfRecording, IndentationRecording
 
 SENSORS = ("s01", "s02", "Ärmel 3")
-SKIN = {
-    "thickness_mm": 2.5,
-    "youngs_modulus_mpa": 16,
-    "poisson_ratio": 0.5,
-    "sensor_radius_mm": 1.5,
-    "sensors": [{"id": sensor, "x_mm": 8.0 * number, "y_mm": 0} for number, sensor in enumerate(SENSORS)],
-}
+PLACED = [{"id": sensor, "x_mm": 8.0 * number, "y_mm": 0} for number, sensor in enumerate(SENSORS)]
 LINES = ((10.0, 7.0, -2.0), (20.0, 7.25, -4.5), (40.0, 7.5, -9.0))
 HEADINGS = (
     "Sensor",
@@ -36,7 +31,7 @@ HEADINGS = (
 RIG: dict[str, Any] = {
     "schema": "rig/1",
     "kind": "frf",
-    "skin": SKIN,
+    "skin": {**SKIN, "sensors": PLACED},
     "recording": {
         "sensor": {"channel": "Sensor"},
         "recorded_at": {"channel": "Time"},

@@ -5,19 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.campaign_documents import SKIN
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
 
 RIG: dict[str, Any] = {
     "schema": "rig/1",
-    "skin": {
-        "thickness_mm": 2.5,
-        "youngs_modulus_mpa": 16,
-        "poisson_ratio": 0.5,
-        "sensor_radius_mm": 1.5,
-        "sensors": [{"id": "s01", "x_mm": 0, "y_mm": 0}],
-    },
+    "skin": SKIN,
     "recording": {"sensor": "s01", "indenter_radius_mm": 4, "preload_n": 1, "dynamic_force_n": 0.09},
     "channels": {
         "frequency_hz": {"channel": "Frequency [Hz]"},

@@ -11,6 +11,7 @@ import openpyxl
 import pytest
 
 from tests.recordings.test_recordings_cells import ABOVE, HEADINGS, PLAIN, ROWS, changed, read
+from tests.support.campaign_documents import SKIN
 from tests.support.cases import first
 from tests.support.instrument_files import CHARGE, FORCE
 from underskin.errors import FileError
@@ -138,13 +139,7 @@ def test_each_sheet_with_a_table_is_a_recording_by_its_name() -> None:
         {
             "schema": "rig/1",
             "name": "shaker",
-            "skin": {
-                "thickness_mm": 2.5,
-                "youngs_modulus_mpa": 16,
-                "poisson_ratio": 0.5,
-                "sensor_radius_mm": 1.5,
-                "sensors": [{"id": "s01", "x_mm": 0, "y_mm": 0}, {"id": "s02", "x_mm": 9, "y_mm": 0}],
-            },
+            "skin": SKIN,
             "recording": {
                 "sensor": {"property": "block"},
                 "indenter_radius_mm": 4,

@@ -202,7 +202,7 @@ def _whole(kind: str, random: np.random.Generator, samples: int) -> Floats:
 def test_clipped_before_noise_was_added(kind: str) -> None:
     """A rail with noise behind it is overload in either channel; signals that dwell at their extremes are whole."""
     clipped_pairs = seen = 0
-    for seed in range(20 if SOAK else 6):
+    for seed in range(20 if SOAK else 12):
         random = np.random.default_rng(seed)
         force, gain = _whole(kind, random, 8192), 7.4
         noise = random.normal(0.0, 10 ** random.uniform(-3.0, -1.5), (2, len(force)))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.campaign_documents import SKIN
 from tests.support.instrument_files import matlab_5, numpy_file, plain_hdf5
 from underskin.errors import FileError
 from underskin.recordings import Reading, read_file, rig_description
@@ -16,13 +17,6 @@ RATE = 2000.0
 TIME = np.arange(400) / RATE
 FORCE = 1.0 + 0.05 * np.sin(2 * np.pi * 50 * TIME)
 CHARGE = 7.4 * (FORCE - 1)
-SKIN = {
-    "thickness_mm": 2.5,
-    "youngs_modulus_mpa": 16,
-    "poisson_ratio": 0.5,
-    "sensor_radius_mm": 1.5,
-    "sensors": [{"id": "s01", "x_mm": 0, "y_mm": 0}],
-}
 RIG: dict[str, Any] = {
     "schema": "rig/1",
     "skin": SKIN,

@@ -67,7 +67,6 @@ def last_force(stage_n_per_mm: float) -> float:
     return float(force[np.flatnonzero(force)[-1]] / (np.pi * W_S * R))
 
 
-@pytest.mark.slow
 def test_pull_off_lies_between_the_limits_of_a_soft_and_a_stiff_stage() -> None:
     """−3/2 π w R under force control, −5/6 π w R under displacement control."""
     limits = [last_force(stage) for stage in (1e-4, 3e-3, np.inf)]
@@ -95,7 +94,6 @@ def test_an_edge_at_rest_is_a_flat_punch() -> None:
     assert slope == pytest.approx(2 * PLANE * a, rel=1e-4)
 
 
-@pytest.mark.slow
 def test_the_cycle_dissipates_the_hysteresis() -> None:
     """Work over the cycle: (w_s − w) over the largest contact, and what snap-in and tear release at constant depth."""
     _, travel, _, force = there_and_back(STICKY, 0.0, 8000)

@@ -81,7 +81,6 @@ def test_finite_strain_at_the_prototypes_contact(load: float, ratio: float) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_finite_strain_as_kept_is_what_the_solver_gives_between_the_nodes() -> None:
     k = WAVENUMBERS[WAVENUMBERS < finite_strain_solve.HIGHEST_WAVENUMBER]
     for a in first(1, (1.03, 0.35)):
@@ -230,7 +229,6 @@ def test_a_neighbour_far_off_on_a_thin_skin_adds_no_charge() -> None:
     assert coupled == pytest.approx(alone, rel=1e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_all_effects_of_the_catalogue_work_together() -> None:
     together = {name: PARAMETERS[name] for name in PARAMETERS if name in effects.EFFECTS}

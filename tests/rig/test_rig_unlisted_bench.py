@@ -1,7 +1,5 @@
 """The virtual bench: noise, companions and what a law does to the state."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Other layers and contacts against exact values: Poisson ratio, slip, moving edge, adhesion, sphere on a layer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

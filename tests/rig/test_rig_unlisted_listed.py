@@ -1,7 +1,5 @@
 """Mechanisms of the catalogue as rivals of a hidden law: what they explain, and what they cannot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

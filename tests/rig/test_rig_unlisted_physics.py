@@ -1,7 +1,5 @@
 """The bench's physics against exact values and identities."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

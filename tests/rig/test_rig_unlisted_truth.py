@@ -1,7 +1,5 @@
 """Written campaigns and their truth: format, determinism, consistency."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -32,7 +30,6 @@ def campaigns() -> list[Campaign]:
     return [draw(np.random.default_rng([SEED, i]), f"{i:04d}") for i in range(1, COUNT + 1)]
 
 
-@pytest.mark.slow
 def test_format(campaigns: list[Campaign]) -> None:
     for campaign in campaigns:
         body: dict[str, Any] = json.loads(json.dumps(as_json(campaign), allow_nan=False))
@@ -116,7 +113,6 @@ def test_modelling_a_visible_law_predicts_better(campaigns: list[Campaign]) -> N
     assert np.mean(better) > 0.85
 
 
-@pytest.mark.slow
 def test_writes_what_is_drawn_alone(campaigns: list[Campaign], tmp_path: Path) -> None:
     """The same again, whatever was written before it."""
     drawn = campaigns[: 2 if SOAK else 1]

@@ -178,8 +178,7 @@ def too_large(answer: httpx.Response) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("chunked", [False, True])
-def test_proxy_passes_no_login_form_too_long(proxy: tuple[httpx.Client, int], chunked: bool) -> None:
-    """The proxy passes on no login form that is too long."""
+def test_the_proxy_passes_on_no_login_form_that_is_too_long(proxy: tuple[httpx.Client, int], chunked: bool) -> None:
     client, _ = proxy
     form = b"key=" + b"k" * 10_000
     content = (piece for piece in (form[:1000], form[1000:])) if chunked else form
@@ -188,22 +187,19 @@ def test_proxy_passes_no_login_form_too_long(proxy: tuple[httpx.Client, int], ch
     assert "what the proxy passes on" in too_large(answer)["detail"]
 
 
-def test_proxy_passes_uploads_beyond_limit(proxy: tuple[httpx.Client, int]) -> None:
-    """The proxy passes on uploads beyond the limit of other bodies."""
+def test_the_proxy_passes_on_uploads_beyond_the_limit_of_other_bodies(proxy: tuple[httpx.Client, int]) -> None:
     client, _ = proxy
     document = b" " * 70_000_000
     assert ask(client, "POST", "/v1/campaigns", files={"file": ("blank.json", document)}).status_code == 422
     assert "the proxy" in too_large(ask(client, "POST", "/v1/sigma", content=document))["detail"]
 
 
-def test_site_s_limits_settings() -> None:
-    """The site s limits are those of the settings."""
+def test_the_sites_limits_are_those_of_the_settings() -> None:
     sizes = dict(re.findall(r"client_max_body_size +(\d+)(m);", SITE.read_text()))
     assert set(sizes) == {f"{Settings.model_fields[name].default:g}" for name in ("max_body_mb", "max_upload_mb")}
 
 
-def test_proxy_takes_longest_address_page(proxy: tuple[httpx.Client, int]) -> None:
-    """The proxy takes the longest address of a page and no longer header."""
+def test_the_proxy_takes_the_longest_address_of_a_page_and_no_longer_header(proxy: tuple[httpx.Client, int]) -> None:
     client, _ = proxy
     assert ask(client, "GET", f"/v1/sigma?a_over_h=0.3&rt_over_h={'0' * 50_000}0.6").status_code == 200
     assert ask(client, "GET", "/health", headers={"X-Long": "k" * 70_000}).status_code == 400
@@ -223,8 +219,7 @@ def test_who_does_not_go_on_is_disconnected(proxy: tuple[httpx.Client, int]) -> 
 
 
 @pytest.mark.parametrize("path", ["/v1/skins/{}", "/v1/skins/%75s{}", "/v1/sigma?key={}", "/login?next=/{}"])
-def test_no_log_key_came_address(proxy: tuple[httpx.Client, int], folder: Path, path: str) -> None:
-    """No log has a key that came in an address."""
+def test_no_log_has_a_key_that_came_in_an_address(proxy: tuple[httpx.Client, int], folder: Path, path: str) -> None:
     client, plain = proxy
     key = client.headers["Authorization"].removeprefix("Bearer ")
     sent = path.format(key.removeprefix("us") if "%75s" in path else key)

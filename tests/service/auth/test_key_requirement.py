@@ -58,11 +58,8 @@ def assert_closed(server: Server) -> None:
 
 
 @on_sqlite
-def test_running_server_stays_closed(place: Place, tmp_path: Path) -> None:
-    """A running server stays closed until a command opens it.
-
-    Whatever becomes of its file meanwhile: gone, put back, damaged, or on a disk that has an error.
-    """
+def test_a_running_server_stays_closed_until_a_command_opens_it(place: Place, tmp_path: Path) -> None:
+    """Whatever becomes of its file meanwhile: gone, put back, damaged, or on a disk that has an error."""
     there, aside = place.folder / "keys.json", tmp_path / "aside"
     log = place.folder.parent / f"{place.folder.name}.log"
     with running(place, **QUIET) as server:
@@ -126,11 +123,8 @@ def test_other_machines_need_a_key_all_the_same(place: Place) -> None:
         assert anonymous(server).status_code == 401
 
 
-def test_restore_opens_nothing_says_keys_needed(place: Place, tmp_path: Path) -> None:
-    """A restore opens nothing and says where keys are needed.
-
-    Of a store that never had a key it says nothing of them; the server runs meanwhile.
-    """
+def test_a_restore_opens_nothing_and_says_where_keys_are_needed(place: Place, tmp_path: Path) -> None:
+    """Of a store that never had a key it says nothing of them; the server runs meanwhile."""
     before, kept = tmp_path / "before", tmp_path / "kept"
     with running(place, **QUIET) as server:
         assert place.command("backup", str(before)).returncode == 0
@@ -154,8 +148,7 @@ def test_restore_opens_nothing_says_keys_needed(place: Place, tmp_path: Path) ->
     assert f"keys are needed: those in {other.folder / 'keys.json'}" in told
 
 
-def test_key_made_though_store_cannot_note(tmp_path: Path) -> None:
-    """A key is made though the store cannot note it."""
+def test_a_key_is_made_though_the_store_cannot_note_it(tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "underskin.sqlite3").write_text("no database")
     done = Place(tmp_path / "data").command("key", "create", "lab")
@@ -163,8 +156,7 @@ def test_key_made_though_store_cannot_note(tmp_path: Path) -> None:
     assert "the key is made; the store will note it" in done.stderr
 
 
-def test_servers_database_closed_together(request: pytest.FixtureRequest, tmp_path: Path) -> None:
-    """Servers of one database are closed together."""
+def test_servers_of_one_database_are_closed_together(request: pytest.FixtureRequest, tmp_path: Path) -> None:
     url = request.getfixturevalue("cluster").new_database()
     first, second = Place(tmp_path / "first", url), Place(tmp_path / "second", url)
     with running(first, **QUIET) as one, running(second, **QUIET) as two:
@@ -177,8 +169,7 @@ def test_servers_database_closed_together(request: pytest.FixtureRequest, tmp_pa
         require_status(two, 200)
 
 
-def test_noted_stays_noted(place: Place) -> None:
-    """What is noted stays noted from when it was."""
+def test_what_is_noted_stays_noted_from_when_it_was(place: Place) -> None:
     store = open_store(place.database_url, place.folder)
     noted = []
     for change in (key_requirement.require, key_requirement.require, key_requirement.lift, key_requirement.lift):
@@ -192,8 +183,7 @@ def test_noted_stays_noted(place: Place) -> None:
     assert database(place.database_url, place.folder).is_made()
 
 
-def test_commands_say_file_keys_missing(place: Place) -> None:
-    """Commands say that the file of keys is missing."""
+def test_commands_say_that_the_file_of_keys_is_missing(place: Place) -> None:
     never = place.command("key", "list")
     assert (never.returncode, never.stdout, never.stderr) == (0, "", "")
     with closing(open_store(place.database_url, place.folder)):

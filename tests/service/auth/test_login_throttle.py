@@ -32,8 +32,7 @@ def tried(url: str, key: str, forwarded: str | None = None) -> httpx.Response:
         return browser.post("/login", data={"key": key, "form_token": token_of(form.text)})
 
 
-def test_guesses_keys_wait_logs(guarded: tuple[str, str]) -> None:
-    """Who guesses keys has to wait and who has one logs in before."""
+def test_who_guesses_keys_has_to_wait_and_who_has_one_logs_in_before(guarded: tuple[str, str]) -> None:
     url, key = guarded
     assert [tried(url, f"us_{number:032d}").status_code for number in range(AT_ONCE)] == [401] * AT_ONCE
     refused = tried(url, key)
@@ -42,8 +41,7 @@ def test_guesses_keys_wait_logs(guarded: tuple[str, str]) -> None:
     assert httpx.get(f"{url}/v1/tables", headers={"Authorization": f"Bearer {key}"}).status_code == 200
 
 
-def test_tries_counted_address_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tries are counted by address and forgotten."""
+def test_tries_are_counted_by_address_and_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 1000.0
     monkeypatch.setattr("service.auth.login_throttle.time.monotonic", lambda: now)
     throttle = LoginThrottle()
@@ -59,8 +57,7 @@ def test_tries_counted_address_forgotten(monkeypatch: pytest.MonkeyPatch) -> Non
     assert [throttle.begin("a") for _ in range(AT_ONCE)] == [0] * AT_ONCE
 
 
-def test_tries_time_count(guarded: tuple[str, str]) -> None:
-    """Tries at the same time count as those one after the other."""
+def test_tries_at_the_same_time_count_as_those_one_after_the_other(guarded: tuple[str, str]) -> None:
     url, _ = guarded
     with ThreadPoolExecutor(30) as senders:
         seen = Counter(answer.status_code for answer in senders.map(tried, [url] * 30, ["us_" + 32 * "0"] * 30))
@@ -68,8 +65,7 @@ def test_tries_time_count(guarded: tuple[str, str]) -> None:
     assert seen[401] + seen[429] == 30
 
 
-def test_addresses_behind_proxy_machine_told(guarded: tuple[str, str]) -> None:
-    """Addresses behind a proxy on this machine are told apart."""
+def test_addresses_behind_a_proxy_on_this_machine_are_told_apart(guarded: tuple[str, str]) -> None:
     url, key = guarded
     wrong = "us_" + 32 * "0"
     for number in range(AT_ONCE):
@@ -80,8 +76,7 @@ def test_addresses_behind_proxy_machine_told(guarded: tuple[str, str]) -> None:
     assert tried(url, key, "nonsense").status_code == 303  # counts as the proxy itself
 
 
-def test_proxies_elsewhere_named_believed() -> None:
-    """Of proxies elsewhere those that are named are believed."""
+def test_of_proxies_elsewhere_those_that_are_named_are_believed() -> None:
     networks = Settings(proxies="172.16.0.0/12, 2001:db8:7::1").proxy_networks
 
     def seen(peer: str, forwarded: str) -> str:
@@ -96,8 +91,7 @@ def test_proxies_elsewhere_named_believed() -> None:
     assert seen("2001:db8:7::2", "198.51.100.7") == "2001:db8:7::2"
 
 
-def test_addresses_ipv4_told_apart_socket_ipv6() -> None:
-    """Addresses of ipv4 are told apart on a socket of ipv6."""
+def test_addresses_of_ipv4_are_told_apart_on_a_socket_of_ipv6() -> None:
     assert network_of("::ffff:192.0.2.7") == network_of("192.0.2.7") == "192.0.2.7"
     assert network_of("::ffff:192.0.2.8") == "192.0.2.8"
     assert network_of("2001:db8::7") == network_of("2001:db8::8") == "2001:db8::/64"

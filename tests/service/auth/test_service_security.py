@@ -110,8 +110,7 @@ def test_a_page_of_another_origin_cannot_post(http: httpx.Client, path: str, ori
 
 
 @pytest.mark.parametrize("method", ["PUT", "PATCH", "DELETE"])
-def test_methods_change_something_refused_well(http: httpx.Client, method: str) -> None:
-    """Other methods that change something are refused as well."""
+def test_other_methods_that_change_something_are_refused_as_well(http: httpx.Client, method: str) -> None:
     problem_of(http.request(method, "/v1/sigma", headers={"Origin": FOREIGN[0]}), 403)
 
 
@@ -189,8 +188,7 @@ def test_what_is_not_a_key_is_refused(keyed: Keyed, locked: httpx.Client, spoile
     problem_of(locked.get(ONE_SIGMA, headers=[(b"Authorization", sent.encode("latin-1"))]), 401)
 
 
-def test_neither_name_nor_hash_key_key(keyed: Keyed, locked: httpx.Client) -> None:
-    """Neither the name nor the hash of a key is a key."""
+def test_neither_the_name_nor_the_hash_of_a_key_is_a_key(keyed: Keyed, locked: httpx.Client) -> None:
     for sent in [part for entry in keys_in(keyed.folder).entries() for part in (entry.name, entry.sha256)]:
         problem_of(locked.get(ONE_SIGMA, headers=bearer(sent)), 401)
 
@@ -210,8 +208,7 @@ def test_tokens_are_kept_nowhere(keyed: Keyed, locked: httpx.Client) -> None:
         assert not any(token.encode() in text for text in [*written, listed.encode()])
 
 
-def test_running_server_follows_command_line(tmp_path: Path) -> None:
-    """A running server follows the command line."""
+def test_a_running_server_follows_the_command_line(tmp_path: Path) -> None:
     with running(tmp_path) as started:
         assert httpx.get(started.url + ONE_SIGMA).status_code == 200
         made = command(tmp_path, "key", "create", "first")
@@ -278,8 +275,7 @@ def test_a_damaged_file_of_keys_opens_nothing(tmp_path: Path) -> None:
 # Reached from other machines
 
 
-def test_without_keys_machines_not_let(tmp_path: Path) -> None:
-    """Without keys other machines are not let in."""
+def test_without_keys_other_machines_are_not_let_in(tmp_path: Path) -> None:
     assert "on 0.0.0.0 without API keys" in refusal(tmp_path, "serve", "--host", "0.0.0.0", "--port", "0")
     names = "skin.example.org"
     assert f"as {names} without API keys" in refusal(tmp_path, "serve", "--port", "0", UNDERSKIN_HOSTS=names)

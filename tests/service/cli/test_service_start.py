@@ -38,15 +38,13 @@ def test_a_port_in_use_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", ["a file/data", "/proc/underskin"])
-def test_data_folder_cannot_written_named(tmp_path: Path, place: str) -> None:
-    """A data folder that cannot be written is named."""
+def test_a_data_folder_that_cannot_be_written_is_named(tmp_path: Path, place: str) -> None:
     (tmp_path / "a file").touch()  # in the way whoever runs this, and /proc takes no folder even from root
     data = tmp_path / place
     assert f"the data folder {data} (UNDERSKIN_DATA) is not writable: " in refusal(tmp_path, UNDERSKIN_DATA=str(data))
 
 
-def test_data_folder_made_owner_alone_stays(tmp_path: Path) -> None:
-    """A data folder is made for its owner alone and one that is there stays as it is."""
+def test_a_data_folder_is_made_for_its_owner_alone_and_one_that_is_there_stays_as_it_is(tmp_path: Path) -> None:
     with running(tmp_path):
         assert (tmp_path / "data").stat().st_mode & 0o777 == 0o700
     own, shared = tmp_path / "own", tmp_path / "shared"
@@ -57,8 +55,7 @@ def test_data_folder_made_owner_alone_stays(tmp_path: Path) -> None:
         assert folder.stat().st_mode & 0o777 == mode
 
 
-def test_data_folder_lost_later_makes_server(tmp_path: Path) -> None:
-    """A data folder lost later makes the server not ready."""
+def test_a_data_folder_lost_later_makes_the_server_not_ready(tmp_path: Path) -> None:
     with running(tmp_path) as started:
         (tmp_path / "data").rename(tmp_path / "moved")
         refused = httpx.get(f"{started.url}/ready")

@@ -63,8 +63,7 @@ def test_answered_disk_uploads_hangs(hanging_server: Server, disk: HangingDisk, 
         assert {one.result() for one in sent} == {201}
 
 
-def test_headers_export_answered_without_making(hanging_server: Server, disk: HangingDisk) -> None:
-    """The headers of an export are answered without making it."""
+def test_the_headers_of_an_export_are_answered_without_making_it(hanging_server: Server, disk: HangingDisk) -> None:
     http = hanging_server.http
     sent = http.post("/v1/campaigns?skin=exported", json=campaign("exported")).json()
     for path in ("/v1/skins/exported/export", f"/v1/campaigns/{sent['id']}/document?format=hdf5"):

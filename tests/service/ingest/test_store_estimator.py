@@ -43,8 +43,7 @@ def require_estimated(server: Server, ids: dict[str, str]) -> None:
         assert first["estimator"] == name
 
 
-def test_query_form_choose_estimator(server: Server) -> None:
-    """The query and the form choose the estimator."""
+def test_the_query_and_the_form_choose_the_estimator(server: Server) -> None:
     content = orjson.dumps(shaken("shaken"))
     ids = {}
     for name in ESTIMATORS:
@@ -61,8 +60,7 @@ def test_query_form_choose_estimator(server: Server) -> None:
     assert answer.json()["notes"] == ["Hv is for time series, which 6 of 6 recordings are not"]
 
 
-def test_estimator_stays_skin_moves(server: Server, elsewhere: Server, tmp_path: Path) -> None:
-    """The estimator stays with a skin that moves."""
+def test_the_estimator_stays_with_a_skin_that_moves(server: Server, elsewhere: Server, tmp_path: Path) -> None:
     sent = server.http.post("/v1/campaigns?estimator=Hv&skin=palm", json=shaken("shaken")).json()["id"]
     with Client(str(server.http.base_url)) as client, Client(str(elsewhere.http.base_url)) as other:
         client.skins.export("palm", tmp_path / "palm.h5")
@@ -72,8 +70,7 @@ def test_estimator_stays_skin_moves(server: Server, elsewhere: Server, tmp_path:
     assert d33(elsewhere, sent) == d33(server, sent)
 
 
-def test_client_commands_choose_estimator(server: Server, tmp_path: Path) -> None:
-    """The client and the commands choose the estimator."""
+def test_the_client_and_the_commands_choose_the_estimator(server: Server, tmp_path: Path) -> None:
     file = tmp_path / "shaken.json"
     file.write_bytes(orjson.dumps(shaken("shaken")))
     there = ["--url", str(server.http.base_url)]

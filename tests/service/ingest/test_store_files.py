@@ -46,8 +46,7 @@ def test_a_file_is_told_by_its_content(server: Server) -> None:
     assert "rig description" in lying.json()["detail"]
 
 
-def test_rig_description_kept_skin_used(server: Server) -> None:
-    """A rig description is kept with the skin and used again."""
+def test_a_rig_description_is_kept_with_the_skin_and_used_again(server: Server) -> None:
     dated = RIG.replace("2.5}", "2.5, recorded_at: 2026-05-03T12:30:00Z}")
     form = [("rig", ("bench.yaml", dated)), ("file", ("cut.csv", CSV))]
     first = server.http.post("/v1/campaigns?skin=gel", files=form)
@@ -65,8 +64,7 @@ def test_rig_description_kept_skin_used(server: Server) -> None:
     assert server.http.post("/v1/campaigns", files=[("file", ("next.csv", CSV))]).status_code == 422
 
 
-def test_correction_read_rig_campaign_corrects(server: Server) -> None:
-    """A correction is read with the rig of the campaign that it corrects."""
+def test_a_correction_is_read_with_the_rig_of_the_campaign_that_it_corrects(server: Server) -> None:
     form = [("rig", ("bench.yaml", RIG)), ("file", ("cut.csv", CSV))]
     wrong = server.http.post("/v1/campaigns?skin=gel", files=form).raise_for_status().json()["campaigns"][0]["id"]
     named = [("file", ("cut.csv", CSV.replace("2,6", "2,7")))]
@@ -81,8 +79,7 @@ def test_correction_read_rig_campaign_corrects(server: Server) -> None:
     assert absent.status_code == 404
 
 
-def test_wrong_rig_description_told_once(server: Server) -> None:
-    """All that is wrong with a rig description is told at once."""
+def test_all_that_is_wrong_with_a_rig_description_is_told_at_once(server: Server) -> None:
     bad = RIG.replace("schema: rig/1", "schema: rig/1\ntrim: {first_sample: 9, last_sample: 3}\nestimator: H7")
     answer = server.http.post("/v1/campaigns", files=[("rig", ("r.yaml", bad)), ("file", ("cut.csv", CSV))])
     assert answer.status_code == 422
@@ -125,8 +122,7 @@ def test_a_request_may_bring_so_much_and_no_more(server: Server) -> None:
         assert len(answer.content) < 1000
 
 
-def test_many_errors_first_told_counted(server: Server) -> None:
-    """Of many errors the first are told and all counted."""
+def test_of_many_errors_the_first_are_told_and_all_counted(server: Server) -> None:
     document = campaign("mixed", lines=3)
     bad = [{**document["recordings"][0], "id": f"bad {number}", "preload_n": -1} for number in range(150)]
     answer = server.http.post("/v1/campaigns", json={**document, "recordings": [*bad, document["recordings"][0]]})
@@ -141,8 +137,7 @@ def test_many_errors_first_told_counted(server: Server) -> None:
     assert none.json()["detail"] == f"Nothing was kept: {alike}; and 50 more"
 
 
-def test_killed_server_sent_cleared_away(place: Place) -> None:
-    """What a killed server was sent is cleared away."""
+def test_what_a_killed_server_was_sent_is_cleared_away(place: Place) -> None:
     uploads = place.folder / "uploads"
     under_way = threading.Event()
 

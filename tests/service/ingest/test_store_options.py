@@ -32,8 +32,7 @@ def kept(answer: httpx.Response) -> dict[str, Any]:
     return dict(entry)
 
 
-def test_every_option_query_field_form(server: Server) -> None:
-    """Every option of the query is a field of the form too."""
+def test_every_option_of_the_query_is_a_field_of_the_form_too(server: Server) -> None:
     first = kept(send(server, {"skin": "palm-3"}))
     assert first["skin_id"] == "palm-3"
     second = kept(send(server, {"corrects": first["id"], "reason": "cable", "together": "Monday"}))
@@ -83,8 +82,7 @@ def test_an_option_is_no_file(server: Server) -> None:
     assert kept(server.http.post("/v1/campaigns?skin=palm-3", files=other))["skin_id"] == "palm-3"
 
 
-def test_option_request_query_form(server: Server) -> None:
-    """An option is the same request in query and form."""
+def test_an_option_is_the_same_request_in_query_and_form(server: Server) -> None:
     headers = {"Idempotency-Key": "monday"}
     first = send(server, {"skin": "palm-3"}, headers=headers)
     again = send(server, {}, "?skin=palm-3", headers=headers)

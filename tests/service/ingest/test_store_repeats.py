@@ -33,8 +33,7 @@ def post(server: Server, document: Document, **query: str) -> Document:
     return dict(answer.json())
 
 
-def test_campaign_comes_twice_told_counts_once(server: Server) -> None:
-    """A campaign that comes twice is told and counts once."""
+def test_a_campaign_that_comes_twice_is_told_and_counts_once(server: Server) -> None:
     days = [made(f"day {month}", month, d33=14 - 0.1 * month) for month in range(1, 7)]
     first = [post(server, day) for day in days]
     assert [entry["notes"] for entry in first] == [[]] * 6
@@ -64,8 +63,7 @@ def test_campaign_comes_twice_told_counts_once(server: Server) -> None:
     assert (csv.count(first[0]["id"]), csv.count(again[0]["id"])) == (3, 0)
 
 
-def test_twin_counts_once_withdrawn_corrected(server: Server) -> None:
-    """A twin counts once the other is withdrawn or corrected."""
+def test_a_twin_counts_once_the_other_is_withdrawn_or_corrected(server: Server) -> None:
     day = made("monday")
     first = post(server, day)["id"]
     twin = post(server, renamed(day, "again"))["id"]
@@ -77,8 +75,7 @@ def test_twin_counts_once_withdrawn_corrected(server: Server) -> None:
     assert points(server, "palm") == [corrected["id"]]
 
 
-def test_two_points_share_recording_fuller(server: Server) -> None:
-    """Of two points that share a recording the fuller counts."""
+def test_of_two_points_that_share_a_recording_the_fuller_counts(server: Server) -> None:
     whole = made("whole")
     some = [one for one in whole["recordings"] if one["sensor"] == "s0"][:1]
     own = made("own", 2)["recordings"]
@@ -102,8 +99,7 @@ def test_two_points_share_recording_fuller(server: Server) -> None:
     assert "sensor s0: its recordings count in campaign" in page
 
 
-def test_recordings_typed_hand_without_time_kept(server: Server) -> None:
-    """Recordings typed by hand without a time are all kept."""
+def test_recordings_typed_by_hand_without_a_time_are_all_kept(server: Server) -> None:
     day = campaign("typed", sensors=1, lines=5)
     typed = {"frf_re_pc_per_n": [7.0] * 5, "frf_im_pc_per_n": [0.0] * 5}
     base = {name: value for name, value in day["recordings"][0].items() if name not in ("recorded_at", "coherence")}
@@ -127,8 +123,7 @@ def test_recordings_typed_hand_without_time_kept(server: Server) -> None:
     assert third["notes"][0].startswith("1 of these 2 recordings is in campaign typed of skin palm already")
 
 
-def test_excluded_recording_keeps_no_counting(server: Server) -> None:
-    """An excluded recording keeps no other from counting."""
+def test_an_excluded_recording_keeps_no_other_from_counting(server: Server) -> None:
     day = made("monday")
     first = post(server, day)["id"]
     for recording in ("s0-1N", "s0-2N"):
@@ -140,8 +135,7 @@ def test_excluded_recording_keeps_no_counting(server: Server) -> None:
     assert used == {"s0": twin, "s1": first, "s2": first}
 
 
-def test_copy_known_time_skin_not_numbers(server: Server) -> None:
-    """A copy is known at another time and on another skin but not with other numbers."""
+def test_a_copy_is_known_at_another_time_and_on_another_skin_but_not_with_other_numbers(server: Server) -> None:
     day = made("monday")
     first = post(server, day)["id"]
     post(server, renamed(day, "later", recorded_at="2018-01-03T09:00:00Z"))

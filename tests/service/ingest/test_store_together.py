@@ -99,8 +99,7 @@ def test_files_of_different_skins_are_refused(server: Server) -> None:
         assert server.http.post(f"/v1/campaigns?together={name}", json=WHOLE).status_code == 422
 
 
-def test_instrument_files_two_formats_rig(server: Server) -> None:
-    """Instrument files of two formats and their rig."""
+def test_instrument_files_of_two_formats_and_their_rig(server: Server) -> None:
     files = [("one.tdms", tdms(1)), ("two.tdms", tdms(2)), ("three.lvm", lvm(repeats=1).encode())]
     form = [("rig", ("bench.yaml", RIG.encode())), *(("file", file) for file in files)]
     answer = server.http.post("/v1/campaigns?skin=gel&together=Monday", files=form)

@@ -66,8 +66,7 @@ def kept(server: Server, skin: str) -> int:
 
 
 @pytest.mark.soak
-def test_request_files_unfold_too_much_refused(small: Server, zeros: bytes) -> None:
-    """A request of files that unfold to too much is refused."""
+def test_a_request_of_files_that_unfold_to_too_much_is_refused(small: Server, zeros: bytes) -> None:
     before = family_mb(small.process.pid)
     answer = small.http.post("/v1/campaigns?skin=many", files=files(zeros, MANY))
     assert answer.status_code == 413, answer.text

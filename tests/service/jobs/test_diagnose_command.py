@@ -12,8 +12,7 @@ from tests.support.store_server import Server
 from underskin.cli.app import app
 
 
-def test_reports_kept_campaigns_service(working: Server, tmp_path: Path) -> None:
-    """Reports of kept campaigns are those of the service."""
+def test_reports_of_kept_campaigns_are_those_of_the_service(working: Server, tmp_path: Path) -> None:
     reports = tmp_path / "reports"
     kept, few = sent(working, small()), [word for name in BESIDE_SKINS for word in ("--without", name)]
     given = ["--campaign", kept, "--campaign", "nowhere", "--url", str(working.http.base_url), *few]

@@ -33,8 +33,7 @@ def refused(server: Server, path: str, body: Any, status: int) -> dict[str, Any]
     return problem_of(server.http.post(path, json=body), status)
 
 
-def test_campaigns_skin_diagnosed_together(working: Server) -> None:
-    """Campaigns of a skin are diagnosed together."""
+def test_campaigns_of_a_skin_are_diagnosed_together(working: Server) -> None:
     with Client(str(working.http.base_url)) as client:
         ids = [sent(working, resonant("array", preloads=(1.0,), lines=6, seed=seed)) for seed in range(2)]
         asked = partial(client.skins.diagnose, "palm", name="palm since May", without=MOST)
@@ -70,11 +69,8 @@ def test_skins_of_a_fleet_are_diagnosed_together(working: Server) -> None:
         assert again == {"id": done["id"], "state": "done"}
 
 
-def test_blocks_alone_refused_once_beside(server: Server) -> None:
-    """Blocks alone are refused at once and beside one campaign of frfs are not.
-
-    Campaigns are compared by FRFs.
-    """
+def test_blocks_alone_are_refused_at_once_and_beside_one_campaign_of_frfs_are_not(server: Server) -> None:
+    """Campaigns are compared by FRFs."""
     travel = [0.05 * step for step in range(20)]
     cylinder = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
     cylinder |= {"displacement_mm": travel, "force_n": [125.0 * one for one in travel]}
@@ -135,8 +131,7 @@ def test_asked_at_once_is_queued_once(server: Server) -> None:
     assert (len(told), len(set(told))) == (8, 2)
 
 
-def test_change_campaign_outdates(server: Server, client: Client) -> None:
-    """A change of a campaign outdates what is of it."""
+def test_a_change_of_a_campaign_outdates_what_is_of_it(server: Server, client: Client) -> None:
     ids = sent_to(server, "palm", 4)
     whole = client.skins.diagnose("palm")["id"]
     chosen = client.skins.diagnose("palm", ids[:2])["id"]
@@ -163,8 +158,7 @@ def test_change_campaign_outdates(server: Server, client: Client) -> None:
     assert outdated() == [withdrawn, withdrawn]
 
 
-def test_skin_too_few_campaigns_refused(server: Server, client: Client) -> None:
-    """A skin with too few campaigns is refused."""
+def test_a_skin_with_too_few_campaigns_is_refused(server: Server, client: Client) -> None:
     assert "no skin 'palm'" in refused(server, "/v1/skins/palm/diagnosis", {}, 404)["detail"]
     first, second = sent_to(server, "palm", 2)
     client.campaigns.withdraw(second, "wrong sphere")

@@ -99,11 +99,8 @@ def test_a_campaign_is_diagnosed_once(working: Server) -> None:
 
 
 @on("sqlite")
-def test_killed_server_leaves_no_process_takes(place: Place) -> None:
-    """A killed server leaves no process and takes up what it was at.
-
-    Diagnoses of a campaign and of several.
-    """
+def test_a_killed_server_leaves_no_process_and_takes_up_what_it_was_at(place: Place) -> None:
+    """Diagnoses of a campaign and of several."""
     with running(place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
         first, second = (begun(server, small(), name) for name in ("a", "b"))
         client.campaigns.post(resonant("another", preloads=(1.0,), lines=6, seed=3), skin="b")
@@ -123,8 +120,7 @@ def test_killed_server_leaves_no_process_takes(place: Place) -> None:
 
 
 @on("postgresql")
-def test_server_ends_puts_back(place: Place) -> None:
-    """A server that ends puts back what it was at."""
+def test_a_server_that_ends_puts_back_what_it_was_at(place: Place) -> None:
     with running(place, **ONE) as server:
         diagnosis_id = asked(server, sent(server, long()))
         (worker,) = await_workers(server, 1)
@@ -135,8 +131,7 @@ def test_server_ends_puts_back(place: Place) -> None:
         assert found(server, diagnosis_id)["state"] == "queued"
 
 
-def test_cancelled_runs_waits(working: Server) -> None:
-    """Cancelled while it runs and while it waits."""
+def test_cancelled_while_it_runs_and_while_it_waits(working: Server) -> None:
     with Client(str(working.http.base_url)) as client:
         first, second = (asked(working, sent(working, long(), name)) for name in ("a", "b"))
         (worker,) = await_workers(working, 1)
@@ -152,11 +147,8 @@ def test_cancelled_runs_waits(working: Server) -> None:
         assert found(working, first)["state"] == found(working, second)["state"] == "cancelled"
 
 
-def test_fork_server_kept_ready_replaced_killed(working: Server) -> None:
-    """A fork server is kept ready and replaced when it is killed.
-
-    A worker that it has forked goes on without it.
-    """
+def test_a_fork_server_is_kept_ready_and_replaced_when_it_is_killed(working: Server) -> None:
+    """A worker that it has forked goes on without it."""
     (ready,) = await_workers(working, 1, "underskin-ready")
     diagnosis_id = begun(working, small())
     (worker,) = await_workers(working, 1)
@@ -206,8 +198,7 @@ def test_beyond_a_limit_fails(tmp_path: Path) -> None:
             assert diagnosis_id != slow or failed["reason"].startswith("it takes more than 2 s on a processor (")
 
 
-def test_campaign_cannot_diagnosed_says_why(working: Server) -> None:
-    """A campaign that cannot be diagnosed says why."""
+def test_a_campaign_that_cannot_be_diagnosed_says_why(working: Server) -> None:
     document = campaign("cylinder")
     document["skin"] = {"poisson_ratio": 0.5}
     curve = {"displacement_mm": [0.0, 0.0, 0.0], "force_n": [0.0, 0.0, 0.0]}
@@ -218,8 +209,7 @@ def test_campaign_cannot_diagnosed_says_why(working: Server) -> None:
     assert (diagnosis["verdict"] == "insufficient_data") or diagnosis["reason"], diagnosis
 
 
-def test_servers_claim_once_get_different_ones(server: Server) -> None:
-    """Servers that claim at once get different ones."""
+def test_servers_that_claim_at_once_get_different_ones(server: Server) -> None:
     ids = [asked(server, sent(server, campaign(str(number), sensors=1))) for number in range(12)]
     claimed: list[str] = []
     together = threading.Barrier(4)
@@ -242,8 +232,7 @@ def test_servers_claim_once_get_different_ones(server: Server) -> None:
     assert sorted(claimed) == sorted(ids)
 
 
-def test_silent_server_loses_cannot_end(server: Server) -> None:
-    """A silent server loses what it was at and cannot end it."""
+def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(server: Server) -> None:
     asked(server, sent(server, campaign("array")))
     store = database(server.place.database_url, server.place.folder)
     with closing(store), store.writing() as connection:
@@ -265,11 +254,8 @@ def test_silent_server_loses_cannot_end(server: Server) -> None:
         assert diagnoses.find(connection, row.id).state == "done"
 
 
-def test_no_clock_wrong_takes_diagnosis(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No clock that is wrong takes a diagnosis over.
-
-    One that runs an hour ahead takes nothing; where the clock was set back, a killed server is told in time.
-    """
+def test_no_clock_that_is_wrong_takes_a_diagnosis_over(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that runs an hour ahead takes nothing; where the clock was set back, a killed server is told in time."""
     asked(server, sent(server, campaign("array")))
     true, alive_at = time.time(), table_of_diagnoses.c.alive_at
     store = database(server.place.database_url, server.place.folder)

@@ -81,11 +81,8 @@ def state(store: Database, diagnosis_id: str) -> str:
 
 
 @pytest.mark.soak
-def test_short_diagnoses_not_wait_long_ones(store: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Short diagnoses do not wait for long ones.
-
-    With one worker that is at a long one, and another long one before them in the queue.
-    """
+def test_short_diagnoses_do_not_wait_for_long_ones(store: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With one worker that is at a long one, and another long one before them in the queue."""
     for name, seconds in (("_LONG_S", 0.3), ("_SHORT_S", 1.0), ("_POLL_S", 0.05), ("_BEAT_S", 0.05)):
         monkeypatch.setattr(runner, name, seconds)
     first, second = (in_queue(store, "long", sensors) for sensors in (4, 3))

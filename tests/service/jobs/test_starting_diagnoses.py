@@ -63,10 +63,9 @@ def test_diagnosis_worker_slow_start_kept_alive(place: Place) -> None:
 
 
 @pytest.mark.soak
-def test_diagnosis_no_thread_starts_put_back(
+def test_a_diagnosis_for_which_no_thread_starts_is_put_back_and_done_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """A diagnosis for which no thread starts is put back and done later."""
     tried: list[float] = []
     start: Callable[[threading.Thread], None] = threading.Thread.start
 

@@ -10,8 +10,7 @@ from io import BytesIO
 from service.jobs.process import WorkerProcess
 
 
-def test_end_worker_seen_thousand_files_open() -> None:
-    """The end of a worker is seen where a thousand files are open."""
+def test_the_end_of_a_worker_is_seen_where_a_thousand_files_are_open() -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     reads, writes = os.pipe()
     os.write(writes, b"0")

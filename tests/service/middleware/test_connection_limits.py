@@ -120,9 +120,7 @@ def test_a_body_that_trickles_is_given_up(server: Server, path: str, drip: bytes
     assert is_well(server)
 
 
-def test_body_goes_taken_however_long_takes(server: Server) -> None:
-    """A body that goes on is taken however long it takes."""
-
+def test_a_body_that_goes_on_is_taken_however_long_it_takes(server: Server) -> None:
     def attempt() -> None:
         body = json.dumps({"a_over_h": 0.3, "rt_over_h": 0.6}).encode().ljust(60_000)
         with connect(server) as connection:
@@ -135,8 +133,7 @@ def test_body_goes_taken_however_long_takes(server: Server) -> None:
     undisturbed(attempt)
 
 
-def test_not_take_answer_disconnected(server: Server) -> None:
-    """Who does not take the answer is disconnected."""
+def test_who_does_not_take_the_answer_is_disconnected(server: Server) -> None:
     body = json.dumps({"a_over_h": [0.3] * 200_000, "rt_over_h": 0.6}).encode()
     with reaching(server, "idle_answer"), connect(server) as connection:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -145,11 +142,8 @@ def test_not_take_answer_disconnected(server: Server) -> None:
         until(lambda: counted(server, "idle_answer") != before)
 
 
-def test_request_takes_server_long_not_given(tmp_path: Path) -> None:
-    """A request that takes the server long is not given up.
-
-    The time counts while it is the client's turn alone.
-    """
+def test_a_request_that_takes_the_server_long_is_not_given_up(tmp_path: Path) -> None:
+    """The time counts while it is the client's turn alone."""
     with running(tmp_path, {"UNDERSKIN_IDLE_SECONDS": "1"}) as server:
         numbers = ", ".join(["0.30000000000000004"] * 1_000_000)
         body = f'{{"a_over_h": [{numbers}], "rt_over_h": 0.6}}'.encode()
@@ -185,11 +179,8 @@ def opened(server: Server, count: int, begun: str, stack: ExitStack) -> Sequence
     return connections
 
 
-def test_requests_sent_ahead_answered_order(server: Server) -> None:
-    """Requests sent ahead are answered in their order.
-
-    A hundred, and a last one whose body comes later.
-    """
+def test_requests_sent_ahead_are_answered_in_their_order(server: Server) -> None:
+    """A hundred, and a last one whose body comes later."""
 
     def attempt() -> None:
         body = json.dumps({"a_over_h": 0.3, "rt_over_h": 0.6}).encode().ljust(60_000)
@@ -209,11 +200,8 @@ def test_requests_sent_ahead_answered_order(server: Server) -> None:
     undisturbed(attempt)
 
 
-def test_client_far_ahead_answers_disconnected(server: Server) -> None:
-    """A client far ahead of its answers is disconnected.
-
-    However much it sends and however little it reads, the memory stays and others are answered.
-    """
+def test_a_client_far_ahead_of_its_answers_is_disconnected(server: Server) -> None:
+    """However much it sends and however little it reads, the memory stays and others are answered."""
     request = f"GET /v1/tables HTTP/1.1\r\n{HEAD}\r\n".encode()
     before = family_mb(server.process.pid)
     with reaching(server, "pipelining"), ExitStack() as stack:
@@ -232,11 +220,8 @@ UNREAD = 9 * f"GET /static/plotly.min.js HTTP/1.1\r\n{HEAD}\r\n"
 
 
 @pytest.mark.parametrize("begun", [REFUSED, UNREAD], ids=["refused", "unread"])
-def test_refused_not_read_gives_way(locked: Server, begun: str) -> None:
-    """Who was refused or does not read gives way.
-
-    Though the refused body goes on, and though other requests wait behind the answer that is not read.
-    """
+def test_who_was_refused_or_does_not_read_gives_way(locked: Server, begun: str) -> None:
+    """Though the refused body goes on, and though other requests wait behind the answer that is not read."""
     with ExitStack() as stack:
         connections = [one for _ in range(4) for one in opened(locked, CONNECTIONS, begun, stack)]
         deadline = time.monotonic() + 240
@@ -248,8 +233,7 @@ def test_refused_not_read_gives_way(locked: Server, begun: str) -> None:
             assert is_well(locked)
 
 
-def test_body_goes_after_answer_given(server: Server) -> None:
-    """A body that goes on after its answer is given up."""
+def test_a_body_that_goes_on_after_its_answer_is_given_up(server: Server) -> None:
     with reaching(server, "idle_body"), connect(server) as connection:
         connection.sendall(BODY.replace("60000", "6000000").replace("/v1/sigma", "/v1/nothing").encode() + b"{")
         assert read_answer(connection)[0] == 404
@@ -257,19 +241,15 @@ def test_body_goes_after_answer_given(server: Server) -> None:
 
 
 @pytest.mark.parametrize("begun", ["", "GET /health HTTP/1.1\r\n", BODY], ids=["silent", "headers", "bodies"])
-def test_health_answers_however_many_connections(server: Server, begun: str) -> None:
-    """Health answers however many connections wait."""
+def test_health_answers_however_many_connections_wait(server: Server, begun: str) -> None:
     with reaching(server, "connections"), ExitStack() as stack:
         for _ in range(5):
             opened(server, CONNECTIONS, begun, stack)
             assert is_well(server)
 
 
-def test_beyond_limit_rest_told_come(server: Server) -> None:
-    """Beyond the limit the rest is told to come again.
-
-    While all connections send their bodies, none gives way.
-    """
+def test_beyond_the_limit_the_rest_is_told_to_come_again(server: Server) -> None:
+    """While all connections send their bodies, none gives way."""
 
     def attempt() -> None:
         with ExitStack() as stack:
@@ -296,11 +276,8 @@ def test_beyond_limit_rest_told_come(server: Server) -> None:
     undisturbed(attempt)
 
 
-def test_health_answers_connections_descriptors(tmp_path: Path) -> None:
-    """Health answers with more connections than descriptors.
-
-    The setting is beyond what the process may have open.
-    """
+def test_health_answers_with_more_connections_than_descriptors(tmp_path: Path) -> None:
+    """The setting is beyond what the process may have open."""
     port = free_port()
     command = [str(Path(sys.executable).with_name("underskin")), "serve", "--port", str(port)]
     few = ["sh", "-c", f'ulimit -n {DESCRIPTORS}; exec "$0" "$@"', *command]

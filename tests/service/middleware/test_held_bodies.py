@@ -54,8 +54,7 @@ def test_bodies_at_once_take_bounded_memory(server: Server) -> None:
 
 
 @pytest.mark.soak
-def test_room_free_again_once_answered(server: Server) -> None:
-    """Room is free again once they are answered."""
+def test_room_is_free_again_once_they_are_answered(server: Server) -> None:
     for _ in range(11):
         with begun(server, 7) as connection:
             connection.sendall(b" ")

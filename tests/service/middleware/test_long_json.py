@@ -166,8 +166,7 @@ WRONG: dict[str, tuple[str, Body, int]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_wrong_throughout_refused_once(server: Server, case: str) -> None:
-    """What is wrong throughout is refused at once."""
+def test_what_is_wrong_throughout_is_refused_at_once(server: Server, case: str) -> None:
     path, body, status = WRONG[case]
     before_s, before = processor_s(server.process.pid), memory_bytes(server.process.pid)
     answer = httpx.post(server.url + path, content=body(), headers=JSON, timeout=300)
@@ -208,11 +207,8 @@ def test_what_is_no_number_is_found_where_it_is(server: Server, wrong: str) -> N
         assert abs(int(found[1]) - place) < 8
 
 
-def test_fields_beside_long_column_mean(server: Server) -> None:
-    """Fields beside a long column mean the same.
-
-    Texts that look like lists, escapes, short lists, single numbers, blanks.
-    """
+def test_fields_beside_a_long_column_mean_the_same(server: Server) -> None:
+    """Texts that look like lists, escapes, short lists, single numbers, blanks."""
     column = ", ".join(["0.2500000000000"] * 60_000)
     good = f'\n{{ "model" : "half_space", "a_over_h": [{column}], "rt_over_h":0.6, "load_parameter": 0 }} '
     found = httpx.post(server.url + "/v1/sigma", content=good, headers=JSON, timeout=300).raise_for_status().json()

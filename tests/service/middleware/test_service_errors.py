@@ -92,8 +92,7 @@ def test_wrong_value_is_named_with_its_row(
     ("field", "value", "guess"),
     [("thickness_mm", 0.0025, "m"), ("thickness_mm", 2500.0, "µm"), ("youngs_modulus_mpa", 16e6, "Pa")],
 )
-def test_slip_units_guessed_meant(http: httpx.Client, field: str, value: float, guess: str) -> None:
-    """Slip of units is guessed and can be meant."""
+def test_slip_of_units_is_guessed_and_can_be_meant(http: httpx.Client, field: str, value: float, guess: str) -> None:
     fields = {**FRF, field: value}
     (error,) = problem_of(http.post("/v1/frf", json=fields), 422)["errors"]
     assert error["field"] == field
@@ -101,8 +100,7 @@ def test_slip_units_guessed_meant(http: httpx.Client, field: str, value: float, 
     assert http.post("/v1/frf", json={**fields, "units_checked": True}).status_code == 200
 
 
-def test_skin_without_adopted_model_not_found(http: httpx.Client) -> None:
-    """A skin without an adopted model is not found."""
+def test_a_skin_without_an_adopted_model_is_not_found(http: httpx.Client) -> None:
     for path, good in (("/v1/frf", FRF), ("/v1/d33", D33)):
         answer = http.post(path, json={**good, "model": "adopted", "skin_id": "palm-3"})
         assert "'palm-3' has no adopted model" in problem_of(answer, 404)["detail"]

@@ -48,8 +48,7 @@ def test_the_limit_is_where_the_setting_says(client: httpx.Client, path: str, ch
 
 
 @pytest.mark.usefixtures("client")
-def test_declared_length_refused_before_anything(small: Server) -> None:
-    """A declared length is refused before anything is sent."""
+def test_a_declared_length_is_refused_before_anything_is_sent(small: Server) -> None:
     for length in (LIMIT + 1, 2**64 - 1):
         with connect(small) as connection:
             head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: {length}\r\nExpect: 100-continue\r\n\r\n"
@@ -58,8 +57,7 @@ def test_declared_length_refused_before_anything(small: Server) -> None:
 
 
 @pytest.mark.usefixtures("client")
-def test_connection_serves_after_refused_body(small: Server) -> None:
-    """The connection serves on after a refused body."""
+def test_the_connection_serves_on_after_a_refused_body(small: Server) -> None:
     length = LIMIT + 1
     with connect(small) as connection:
         head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: {length}\r\n\r\n"
@@ -70,8 +68,7 @@ def test_connection_serves_after_refused_body(small: Server) -> None:
 
 
 @pytest.mark.usefixtures("client")
-def test_exceeds_length_too_small_not_taken_body(small: Server) -> None:
-    """What exceeds a length that is too small is not taken for body."""
+def test_what_exceeds_a_length_that_is_too_small_is_not_taken_for_body(small: Server) -> None:
     body = padded("/v1/sigma", LIMIT + 1)
     with connect(small) as connection:
         head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: 20\r\n\r\n"
@@ -90,8 +87,7 @@ def test_exceeds_length_too_small_not_taken_body(small: Server) -> None:
     ["Content-Length: 20\r\nTransfer-Encoding: chunked\r\n", "Content-Length: 20\r\nContent-Length: 90000\r\n"],
 )
 @pytest.mark.usefixtures("client")
-def test_contradictory_lengths_end_connection(small: Server, lengths: str) -> None:
-    """Contradictory lengths end the connection."""
+def test_contradictory_lengths_end_the_connection(small: Server, lengths: str) -> None:
     with connect(small) as connection:
         connection.sendall(f"POST /v1/sigma HTTP/1.1\r\n{HEAD}{lengths}\r\n".encode())
         status, headers, _ = read_answer(connection)
@@ -101,8 +97,7 @@ def test_contradictory_lengths_end_connection(small: Server, lengths: str) -> No
 
 @pytest.mark.parametrize("path", BODIES)
 @pytest.mark.usefixtures("client")
-def test_sender_gives_up_logged(small: Server, path: str) -> None:
-    """A sender who gives up is logged without a traceback."""
+def test_a_sender_who_gives_up_is_logged_without_a_traceback(small: Server, path: str) -> None:
     request_id = f"gone{path.replace('/', '-')}"
     with connect(small) as connection:
         head = f"POST {path} HTTP/1.1\r\n{HEAD}X-Request-ID: {request_id}\r\nContent-Length: 1000\r\n\r\n"

@@ -37,8 +37,7 @@ def lines_of(log: Path, request_id: str) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("path", [SIGMA, "/health", "/nothing", "/metrics"])
-def test_request_id_made_returned_never_repeated(own: Server, path: str) -> None:
-    """A request id is made returned and never repeated."""
+def test_a_request_id_is_made_returned_and_never_repeated(own: Server, path: str) -> None:
     ids = [httpx.get(own.url + path).headers["x-request-id"] for _ in range(5)]
     assert len(set(ids)) == 5
     assert all(re.fullmatch(r"[0-9a-f]{12}-[0-9a-f]+", request_id) for request_id in ids)
@@ -57,8 +56,7 @@ def test_each_request_is_one_line_of_json(own: Server, path: str, status: int) -
     assert line["key"] is None
 
 
-def test_refusal_s_line_says_why_not_came(own: Server) -> None:
-    """A refusal s line says why and not what came."""
+def test_a_refusals_line_says_why_and_not_what_came(own: Server) -> None:
     row = {"thickness_mm": 2.5, "sensor_radius_mm": 1.5, "youngs_modulus_mpa": 16, "indenter_radius_mm": 4}
     secret = "us_" + 40 * "a"
     asked = [
@@ -78,8 +76,7 @@ def test_refusal_s_line_says_why_not_came(own: Server) -> None:
     assert "error" not in good
 
 
-def test_whole_log_json_says_server_listens(own: Server) -> None:
-    """The whole log is json and says where the server listens."""
+def test_the_whole_log_is_json_and_says_where_the_server_listens(own: Server) -> None:
     httpx.get(own.url + SIGMA)
     errors = [line for line in own.log.read_text().splitlines() if not line.startswith(("{", "underskin serves on "))]
     assert errors == []
@@ -136,8 +133,7 @@ KEY = "us_0123456789abcdefABCDEF"  # of a key's shape
 
 
 @pytest.mark.parametrize("path", ["/v1/skins/" + KEY, "/" + KEY])
-def test_key_path_request_id_not_reach_log(own: Server, path: str) -> None:
-    """A key in a path or a request id does not reach the log."""
+def test_a_key_in_a_path_or_a_request_id_does_not_reach_the_log(own: Server, path: str) -> None:
     answer = httpx.get(own.url + path, headers={"X-Request-ID": KEY})
     assert answer.headers["x-request-id"] != KEY
     (line,) = lines_of(own.log, answer.headers["x-request-id"])

@@ -88,16 +88,14 @@ def test_headers_without_end_take_no_memory(keyed: Server, head: str, piece: byt
     assert_modest(keyed, head, piece)
 
 
-def test_chunked_login_form_refused_once(keyed: Server) -> None:
-    """A chunked login form is refused once it is too long."""
+def test_a_chunked_login_form_is_refused_once_it_is_too_long(keyed: Server) -> None:
     with connect(keyed) as connection:
         connection.sendall(f"POST /login HTTP/1.1\r\n{FORM}Transfer-Encoding: chunked\r\n\r\n".encode())
         connection.sendall(b"1f41\r\n" + b"k" * 8001 + b"\r\n")
         assert_too_large(read_answer(connection))
 
 
-def test_forms_pages_counted_come(http: httpx.Client, shared_server: Server) -> None:
-    """Forms of pages are counted as they come in."""
+def test_forms_of_pages_are_counted_as_they_come_in(http: httpx.Client, shared_server: Server) -> None:
     with connect(shared_server) as connection:
         connection.sendall(f"POST /example HTTP/1.1\r\n{FORM}Content-Length: 60000000\r\n\r\n".encode())
         connection.sendall(b"k" * 100_001)  # and no more

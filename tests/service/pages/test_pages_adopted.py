@@ -65,8 +65,7 @@ def test_adopted_model_heads_skin_start(visitor: Visit, server: Server) -> None:
     assert numbers(cell.partition("is ")[2])[0] == pytest.approx(change, rel=0.06)
 
 
-def test_d33_report_quotes_quote(server: Server) -> None:
-    """A d33 that its report quotes is the one to quote."""
+def test_a_d33_that_its_report_quotes_is_the_one_to_quote(server: Server) -> None:
     found = mistuned()
     quotable = {**found, "d33": {**found["d33"], "quotable": True}}
     _, diagnosis_id = diagnosed(server, resonant("sure"), quotable, "palm-e")
@@ -77,8 +76,7 @@ def test_d33_report_quotes_quote(server: Server) -> None:
 
 
 @pytest.mark.parametrize("path", ["design", "loads"])
-def test_design_starts_d33_adopted_model(server: Server, path: str) -> None:
-    """A design starts from d33 by the adopted model."""
+def test_a_design_starts_from_d33_by_the_adopted_model(server: Server, path: str) -> None:
     skin = f"from-{path}"
     document = resonant(skin)
     document["skin"].pop("d33_pc_per_n", None)
@@ -95,8 +93,7 @@ def test_design_starts_d33_adopted_model(server: Server, path: str) -> None:
     assert "not to be quoted yet" in told
 
 
-def test_outdated_model_said_serve_nothing(server: Server) -> None:
-    """An outdated model is said to serve nothing."""
+def test_an_outdated_model_is_said_to_serve_nothing(server: Server) -> None:
     campaign_id, diagnosis_id = diagnosed(server, resonant("gone"), mistuned(), "palm-c")
     server.http.post("/v1/skins/palm-c/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
     sent(server, resonant("stays"), "palm-c")

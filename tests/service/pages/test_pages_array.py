@@ -22,8 +22,7 @@ def place_of(figure: Locator, sensor: str) -> tuple[float, float]:
 
 
 @pytest.mark.soak
-def test_click_map_leads_sensor_s_history(newcomer: Visit) -> None:
-    """A click on the map leads to a sensor s history and recordings."""
+def test_a_click_on_the_map_leads_to_a_sensors_history_and_recordings(newcomer: Visit) -> None:
     page = newcomer.page
     newcomer.drawn(2)
     page.mouse.click(*place_of(page.locator("#figure-map"), "s03"))

@@ -117,8 +117,7 @@ def one_sensor(number: int) -> dict[str, object]:
     return to_dict(replace(made, name=f"single {number}", recordings=undated))
 
 
-def test_frfs_offered_none_itself(server: Server) -> None:
-    """Only what has frfs is offered and none with itself."""
+def test_only_what_has_frfs_is_offered_and_none_with_itself(server: Server) -> None:
     first = sent(server, one_sensor(1), "mixed")
     sent(server, block("a block", recorded_at="2031-01-01T00:00:00Z"), "mixed")
     text = server.http.get("/compare?skin=mixed", headers=BROWSING).text
@@ -142,8 +141,7 @@ def pressed(name: str, moduli_mpa: Sequence[float], year: int) -> dict[str, obje
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
-def test_curves_two_campaigns_difference_moduli(visitor: Visit, server: Server, width: int) -> None:
-    """Curves of two campaigns and the difference of their moduli."""
+def test_curves_of_two_campaigns_and_the_difference_of_their_moduli(visitor: Visit, server: Server, width: int) -> None:
     skin = f"pressed{width}"
     ids = [sent(server, pressed("before", (2.0, 2.02, 1.98), 2030), skin)]
     ids.append(sent(server, pressed("after", (1.5, 1.52, 1.48), 2031), skin))
@@ -167,8 +165,7 @@ def test_curves_two_campaigns_difference_moduli(visitor: Visit, server: Server, 
     assert float(rows[3]["youngs_modulus_mpa"]) == pytest.approx(1.5, rel=1e-6)
 
 
-def test_single_curves_difference(server: Server) -> None:
-    """Single curves have a difference without an interval."""
+def test_single_curves_have_a_difference_without_an_interval(server: Server) -> None:
     for name, modulus, year in (("soft", 2.0, 2030), ("hard", 3.0, 2031)):
         sent(server, pressed(name, [modulus], year), "single")
     text = server.http.get("/compare?skin=single", headers=BROWSING).text
@@ -180,8 +177,7 @@ def test_single_curves_difference(server: Server) -> None:
     assert (cells[0], cells[2]) == ("–", "–")
 
 
-def test_kinds_campaigns_offered(server: Server) -> None:
-    """Kinds of which there are campaigns are offered."""
+def test_kinds_of_which_there_are_campaigns_are_offered(server: Server) -> None:
     sent(server, one_sensor(6), "kinds")
     first = sent(server, block("alone", recorded_at="2031-01-01T00:00:00Z"), "kinds")
     text = server.http.get("/compare?skin=kinds", headers=BROWSING).text

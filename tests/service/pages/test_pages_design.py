@@ -22,8 +22,7 @@ def fits_and_is_accessible(visitor: Visit) -> None:
 
 
 @pytest.mark.soak
-def test_design_pinned_moves_beside(visitor: Visit) -> None:
-    """A design is pinned and the other one moves beside it."""
+def test_a_design_is_pinned_and_the_other_one_moves_beside_it(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/design")
     visitor.drawn(2)
@@ -67,8 +66,7 @@ def test_a_pinned_design_that_cannot_be_is_told(server: Server) -> None:
     assert "pitch of the array [mm]: x – must be a number" in answer.text
 
 
-def test_asked_searched_offered_leads_design(visitor: Visit) -> None:
-    """What is asked is searched and what is offered leads to its design."""
+def test_what_is_asked_is_searched_and_what_is_offered_leads_to_its_design(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/design")
     page.get_by_role("link", name="which skins resolve what you ask").press("Enter")

@@ -74,8 +74,7 @@ def test_paper_report_nothing_press_saved_file(visitor: Visit, place: str, downl
     visitor.wrong.clear()  # the file itself is not of the server
 
 
-def test_figure_s_numbers_report(server: Server, place: str) -> None:
-    """A figure s numbers are those of the report."""
+def test_a_figures_numbers_are_those_of_the_report(server: Server, place: str) -> None:
     tables = {
         name: list(csv.DictReader(server.http.get(f"{place}/{name}.csv").text.splitlines()))
         for name in ("where", "before_after", "explanations", "parameters")
@@ -134,8 +133,7 @@ def test_models_laid_over_frf_after_keys(visitor: Visit, server: Server, place: 
     assert on.is_disabled()
 
 
-def test_waits_cancelled_asked(visitor: Visit, server: Server) -> None:
-    """One that waits is cancelled and asked for again."""
+def test_one_that_waits_is_cancelled_and_asked_for_again(visitor: Visit, server: Server) -> None:
     page = visitor.page
     visitor.go(f"/diagnoses/{asked(server, sent(server, resonant('waits'), 'waits'))}")
     assert "waits for its turn" in page.get_by_role("status").inner_text()
@@ -170,8 +168,7 @@ def test_a_report_without_its_figures_says_so(server: Server) -> None:
     assert server.http.get(f"{place}/parameters.csv").status_code == 200
 
 
-def test_imported_report_odd_shape_said(server: Server) -> None:
-    """An imported report of odd shape is said to be one."""
+def test_an_imported_report_of_odd_shape_is_said_to_be_one(server: Server) -> None:
     place = keep(server, "odd", Made({**made().report, "location": None}, {}))
     for path in (place, f"{place}/report.html"):
         answer = server.http.get(path, headers=BROWSING)
@@ -179,8 +176,7 @@ def test_imported_report_odd_shape_said(server: Server) -> None:
         assert "lacks what a page shows" in answer.text
 
 
-def test_figures_older_versions_tell_recordings(server: Server) -> None:
-    """Figures of older versions tell the recordings by name."""
+def test_figures_of_older_versions_tell_the_recordings_by_name(server: Server) -> None:
     figures = dict(made().figures)
     older = orjson.loads(figures["frf"])
     for name in ("indenters_mm", "preloads_n", "left_percent"):

@@ -33,8 +33,7 @@ def trace(visitor: Visit, figure: str, name: str | None = None) -> dict[str, Any
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
-def test_section_base_interface_serves(visitor: Visit, width: int) -> None:
-    """Section and base are what the interface serves."""
+def test_section_and_base_are_what_the_interface_serves(visitor: Visit, width: int) -> None:
     visitor.page.set_viewport_size({"width": width, "height": 844})
     visitor.go(f"/field?{QUERY}")
     visitor.drawn(2)
@@ -95,8 +94,7 @@ def test_the_slider_moves_the_load_by_keys(visitor: Visit, width: int) -> None:
         visitor.page.locator("#figure-base").get_by_role("button", name="SVG").click()
 
 
-def test_request_accepts_page_accepts(server: Server) -> None:
-    """The request that does the same accepts what the page accepts."""
+def test_the_request_that_does_the_same_accepts_what_the_page_accepts(server: Server) -> None:
     small = QUERY.replace("indenter_radius_mm=4", "indenter_radius_mm=0.007").replace(
         "preload_n=3", "preload_n=0.00001"
     )
@@ -111,8 +109,7 @@ def test_request_accepts_page_accepts(server: Server) -> None:
         assert server.http.get("/v1/field", params=fields).raise_for_status().json()["status"] == "ok"
 
 
-def test_errors_stand_form_limit_named(visitor: Visit) -> None:
-    """Errors stand in the form and the limit is named."""
+def test_errors_stand_in_the_form_and_the_limit_is_named(visitor: Visit) -> None:
     visitor.go("/field?thickness_mm=0.0025")
     assert "thickness h [mm]" in visitor.page.get_by_role("alert").inner_text()
     assert visitor.page.get_by_label("thickness h").input_value() == "0.0025"
@@ -126,8 +123,7 @@ def test_errors_stand_form_limit_named(visitor: Visit) -> None:
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
-def test_loads_show_base_lead_sphere(visitor: Visit, width: int) -> None:
-    """Loads show the base and lead to each sphere."""
+def test_loads_show_the_base_and_lead_to_each_sphere(visitor: Visit, width: int) -> None:
     visitor.page.set_viewport_size({"width": width, "height": 844})
     visitor.go("/loads?loads=0 0 4 1%0A%0A12 8 10 2")
     visitor.drawn(2)

@@ -44,8 +44,7 @@ def test_every_form_reads_decimal_commas(visitor: Visit, kept: str, width: int) 
     page.get_by_text("Averaged over your own band, 5.5 to 50").wait_for()
 
 
-def test_change_refused_says_form(visitor: Visit, kept: str) -> None:
-    """A change that is refused says so in its form."""
+def test_a_change_that_is_refused_says_so_in_its_form(visitor: Visit, kept: str) -> None:
     page = visitor.page
     visitor.go(kept)
     page.get_by_text("Exclude a recording, or correct").click()
@@ -67,8 +66,7 @@ def test_change_refused_says_form(visitor: Visit, kept: str) -> None:
     refused(visitor)
 
 
-def test_design_outside_table_says_limit_old(visitor: Visit) -> None:
-    """A design outside the table says which limit and what is old is grey."""
+def test_a_design_outside_the_table_says_which_limit_and_what_is_old_is_grey(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/design")
     visitor.drawn(2)

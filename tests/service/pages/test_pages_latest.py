@@ -49,8 +49,7 @@ def test_a_block_leaves_the_skin_its_geometry_and_map(server: Server) -> None:
     assert 'name="thickness_mm" value="3"' in server.http.get(f"/loads?skin={SKIN}", headers=BROWSING).text
 
 
-def test_campaign_sensor_leaves_map(server: Server, visitor: Visit) -> None:
-    """A campaign of one sensor leaves the others on the map."""
+def test_a_campaign_of_one_sensor_leaves_the_others_on_the_map(server: Server, visitor: Visit) -> None:
     of_one = recorded(campaign("in October", sensors=1), "2026-10-01")
     for document in (recorded(campaign("in May", sensors=3), "2026-05-03"), of_one):
         server.http.post("/v1/campaigns?skin=parts", json=document).raise_for_status()
@@ -70,8 +69,7 @@ def test_campaign_sensor_leaves_map(server: Server, visitor: Visit) -> None:
     assert [row["absent"] for row in rows] == ["", old, old]
 
 
-def test_skin_last_campaign_not_diagnosed_shows(server: Server) -> None:
-    """A skin whose last campaign is not diagnosed shows the diagnosis before."""
+def test_a_skin_whose_last_campaign_is_not_diagnosed_shows_the_diagnosis_before(server: Server) -> None:
     earlier, last = (resonant(name) for name in ("May", "September"))
     diagnosed(server, earlier, report(), skin="half")
     assert "not diagnosed" not in said(server, "/?find=half", "half")
@@ -81,11 +79,8 @@ def test_skin_last_campaign_not_diagnosed_shows(server: Server) -> None:
     assert "of May; the last campaign is not diagnosed" in row
 
 
-def test_skins_order_recording_page_page(server: Server) -> None:
-    """Skins are in the order of recording from page to page.
-
-    Whatever the order they arrived in; a campaign over several days says so.
-    """
+def test_skins_are_in_the_order_of_recording_from_page_to_page(server: Server) -> None:
+    """Whatever the order they arrived in; a campaign over several days says so."""
     emptied(server)
     for number in range(30):
         day = f"2022-{1 + 7 * number % 30 // 3:02d}-{1 + 7 * number % 30 % 3:02d}"

@@ -24,8 +24,7 @@ def place(server: Server) -> str:
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1280]))
-def test_table_sorted_filtered_keyboard(visitor: Visit, place: str, width: int) -> None:
-    """A table is sorted and filtered with the keyboard."""
+def test_a_table_is_sorted_and_filtered_with_the_keyboard(visitor: Visit, place: str, width: int) -> None:
     page = visitor.page
     page.set_viewport_size({"width": width, "height": 844})
     visitor.go(place)
@@ -77,8 +76,7 @@ def test_a_workbook_holds_what_the_csv_does(server: Server, place: str) -> None:
     assert isinstance(rows[1][0], str)
 
 
-def test_file_named_after_skin_campaign_however(server: Server) -> None:
-    """A file is named after skin and campaign however odd their names."""
+def test_a_file_is_named_after_skin_and_campaign_however_odd_their_names(server: Server) -> None:
     skin = 'Hand "ä" 9\u624b'
     sent = server.http.post("/v1/campaigns", params={"skin": skin}, json=campaign('of "May", 1/2')).raise_for_status()
     name = "Hand-ä-9\u624b-of-May-1-2-d33.xlsx"
@@ -96,8 +94,7 @@ def test_no_text_of_a_workbook_is_a_formula() -> None:
     assert [cell.value for cell in sheet["B"]] == ["value", 2.5, None]
 
 
-def test_workbook_keeps_texts_read_like_numbers() -> None:
-    """A workbook keeps texts that read like numbers."""
+def test_a_workbook_keeps_texts_that_read_like_numbers() -> None:
     names = ["01", "1", "1_0", "1e3", "inf", "nan", "NaN", "'quoted"]
     made = workbook(
         {"sensor": names, "value": list(np.arange(8.0)), "preload_n": [1, float("nan"), *[np.float32(2)] * 6]}

@@ -9,8 +9,7 @@ MARK = "window.sameDocument = true"
 STAYED = "window.sameDocument === true"
 
 
-def test_campaign_arrives_shown_without_reload(visitor: Visit, server: Server) -> None:
-    """A campaign that arrives is shown without a reload."""
+def test_a_campaign_that_arrives_is_shown_without_a_reload(visitor: Visit, server: Server) -> None:
     page = visitor.page
     sent(server, campaign("first", sensors=1), "live")
     visitor.go("/skins/live")
@@ -34,8 +33,7 @@ def test_campaign_arrives_shown_without_reload(visitor: Visit, server: Server) -
     visitor.require_accessible()
 
 
-def test_verdict_withdrawal_shown_without_reload(visitor: Visit, server: Server) -> None:
-    """A verdict and a withdrawal are shown without a reload."""
+def test_a_verdict_and_a_withdrawal_are_shown_without_a_reload(visitor: Visit, server: Server) -> None:
     page = visitor.page
     campaign_id = sent(server, campaign("only", sensors=1), "verdict")
     visitor.go("/skins/verdict")

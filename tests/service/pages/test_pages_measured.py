@@ -61,8 +61,7 @@ def test_what_is_wrong_is_said_on_the_page(server: Server, query: dict[str, str]
     assert told in answer.text
 
 
-def test_d33_adopted_model_stands_beside_paper_s(server: Server) -> None:
-    """D33 by the adopted model stands beside the paper s."""
+def test_d33_by_the_adopted_model_stands_beside_the_papers(server: Server) -> None:
     _, diagnosis_id = diagnosed(server, resonant("monday"), mistuned(), "palm-m")
     query = {"skin": "palm-m", "rows": "4 1 7.06 0.1\n8 2 7.45 0.1"}
     assert "d33_adopted_pc_per_n" not in server.http.get("/d33/rows.csv", params=query).text

@@ -24,8 +24,7 @@ def _require_accessible_at_both_widths(visitor: Visit) -> None:
         visitor.require_accessible()
 
 
-def test_law_picture_twins_found(server: Server, visitor: Visit) -> None:
-    """Each law has its picture its twins and where it was found."""
+def test_each_law_has_its_picture_its_twins_and_where_it_was_found(server: Server, visitor: Visit) -> None:
     campaign_id, diagnosis_id = diagnosed(server, resonant("swinging"), report(), skin="found")
     page = visitor.page
     visitor.go("/mechanisms")
@@ -52,8 +51,7 @@ def test_law_picture_twins_found(server: Server, visitor: Visit) -> None:
 
 
 @pytest.mark.parametrize("verdict", ["ambiguous", "unexplained"])
-def test_mechanism_found_surely_present_whatever(server: Server, verdict: str) -> None:
-    """A mechanism is found where it is surely present whatever the verdict."""
+def test_a_mechanism_is_found_where_it_is_surely_present_whatever_the_verdict(server: Server, verdict: str) -> None:
     counted = []
     for probability in (None, 0.9, 0.55):
         if probability is not None:
@@ -67,8 +65,7 @@ def test_mechanism_found_surely_present_whatever(server: Server, verdict: str) -
     assert after == [(was_found + 1, was_possible), (was_found + 1, was_possible + 1)]
 
 
-def test_withdrawn_left_out_counts_found_nowhere(server: Server) -> None:
-    """What was withdrawn or left out counts as found nowhere."""
+def test_what_was_withdrawn_or_left_out_counts_as_found_nowhere(server: Server) -> None:
     campaign_id, _ = diagnosed(server, resonant("taken back"), report(), skin="back")
     rows = server.http.get("/mechanisms/contact_resonance/found.csv").text.splitlines()
     assert rows[0] == "diagnosis,campaign,skin,name,ended_at,verdict,probability"
@@ -79,8 +76,7 @@ def test_withdrawn_left_out_counts_found_nowhere(server: Server) -> None:
     assert campaign_id not in left
 
 
-def test_pictures_drawings_line_strength(server: Server) -> None:
-    """Pictures are drawings with a line for each strength."""
+def test_pictures_are_drawings_with_a_line_for_each_strength(server: Server) -> None:
     answer = server.http.get("/mechanisms/adhesion/picture.svg")
     assert answer.headers["content-type"] == "image/svg+xml"
     tree = ElementTree.fromstring(answer.text)

@@ -9,8 +9,7 @@ from tests.support.store_server import Server, campaign
 
 
 @pytest.mark.soak
-def test_recording_excluded_campaign_withdrawn(visitor: Visit, server: Server) -> None:
-    """A recording is excluded and the campaign withdrawn by clicks."""
+def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(visitor: Visit, server: Server) -> None:
     page = visitor.page
     kept = server.http.post("/v1/campaigns?skin=mind", json=campaign("a loose cable")).json()
     before = server.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]

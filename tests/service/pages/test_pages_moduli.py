@@ -34,8 +34,7 @@ def declared(name: str) -> dict[str, Any]:
     return {**document, "name": name, "skin": {**document["skin"], "youngs_modulus_mpa": 2.5}}
 
 
-def test_modulus_under_answer_first_quote(server: Server) -> None:
-    """The modulus under the answer is the first to quote."""
+def test_the_modulus_under_the_answer_is_the_first_to_quote(server: Server) -> None:
     campaign_id, diagnosis_id = diagnosed(server, declared("moduli"), of_curves("explained"), "moduli")
     told = said(server, f"/campaigns/{campaign_id}")
     quoted = told.index("Quote this one first: 1.75 MPa (95 %: 1.65 to 1.85), under the answer of the latest diagnosis")
@@ -46,8 +45,7 @@ def test_modulus_under_answer_first_quote(server: Server) -> None:
     assert told.index("Quote this one first") < told.index("With the plain law alone, by least squares")
 
 
-def test_no_modulus_quoted_before_answer_settled(server: Server) -> None:
-    """No modulus is quoted before an answer is settled."""
+def test_no_modulus_is_quoted_before_an_answer_is_settled(server: Server) -> None:
     campaign_id, diagnosis_id = diagnosed(server, declared("open"), of_curves("ambiguous"), "open")
     bare = sent(server, declared("bare"), "bare")
     for one in (campaign_id, bare):
@@ -57,8 +55,7 @@ def test_no_modulus_quoted_before_answer_settled(server: Server) -> None:
     assert "Do not quote it yet" in page
 
 
-def test_modulus_recordings_no_longer_use(server: Server) -> None:
-    """A modulus of recordings that are no longer in use is not quoted."""
+def test_a_modulus_of_recordings_that_are_no_longer_in_use_is_not_quoted(server: Server) -> None:
     document = to_dict(pressed(1e5, [2.0, 3.0]))
     document = {**document, "name": "changed", "skin": {**document["skin"], "youngs_modulus_mpa": 2.5}}
     campaign_id, _ = diagnosed(server, document, of_curves("explained"), "changed")
@@ -78,8 +75,7 @@ def declared_wrongly(**skin: Any) -> dict[str, Any]:
     return {**document, "name": "off", "skin": {**document["skin"], **off, **skin}}
 
 
-def test_page_s_interval_holds_d33_skin(server: Server) -> None:
-    """The page s interval holds a d33 of a skin within its tolerances."""
+def test_the_pages_interval_holds_a_d33_of_a_skin_within_its_tolerances(server: Server) -> None:
     campaign_id = sent(server, declared_wrongly(), "off")
     answer = server.http.get(f"/v1/campaigns/{campaign_id}/d33").json()
     array, relative = answer["array"], answer["array_relative"]
@@ -91,8 +87,7 @@ def test_page_s_interval_holds_d33_skin(server: Server) -> None:
     assert "The interval includes what the declared thickness, sensor radius and modulus may be off by" in told
 
 
-def test_stated_tolerances_replace_usual_ones(server: Server) -> None:
-    """Stated tolerances replace the usual ones."""
+def test_stated_tolerances_replace_the_usual_ones(server: Server) -> None:
     exact = {"thickness_percent": 0, "sensor_radius_percent": 0, "youngs_modulus_percent": 0}
     campaign_id = sent(server, declared_wrongly(tolerances=exact), "exact")
     answer = server.http.get(f"/v1/campaigns/{campaign_id}/d33").json()

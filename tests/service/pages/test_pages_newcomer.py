@@ -11,8 +11,7 @@ SKIN = "my-first"
 
 
 @pytest.mark.soak
-def test_start_history_adopted_model(patient: Visit, diagnosing: Server) -> None:
-    """From the start to a history by the adopted model."""
+def test_from_the_start_to_a_history_by_the_adopted_model(patient: Visit, diagnosing: Server) -> None:
     page = patient.page
     patient.go("/")
     page.get_by_role("button", name="Load the example skin").click()

@@ -152,8 +152,7 @@ def _base(server: Server, loads: str) -> str:
     return server.http.get(f"/loads/base.csv?loads={loads}").raise_for_status().text
 
 
-def test_load_no_sensor_feels_strains_layer_much(server: Server) -> None:
-    """A load that no sensor feels and one that strains the layer much are told."""
+def test_a_load_that_no_sensor_feels_and_one_that_strains_the_layer_much_are_told(server: Server) -> None:
     text = server.http.get("/loads?loads=0 0 4 1%0A%0A500 500 4 1", headers=BROWSING).text
     (told,) = re.findall(r"<b>Check load in line 3:</b> (.*?)</p>", text)
     assert re.fullmatch(r"it lies 673.2 mm from the nearest sensor and adds nothing: sensors feel .*", told)
@@ -210,8 +209,7 @@ def test_a_band_without_lines_is_refused_by_name(server: Server) -> None:
         assert server.http.get(f"/campaigns/{kept['id']}/preload.csv?{query}").status_code == 422
 
 
-def test_example_comes_back_once_withdrawn(server: Server) -> None:
-    """The example comes back once all of it was withdrawn."""
+def test_the_example_comes_back_once_all_of_it_was_withdrawn(server: Server) -> None:
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as anyone:
         form = {"form_token": token_of(anyone.get("/").text)}
         anyone.post("/example", data=form)

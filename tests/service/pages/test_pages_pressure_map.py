@@ -85,8 +85,7 @@ def test_a_map_is_seen_computed_and_saved(visitor: Visit, server: Server) -> Non
         (b"mm,0,1\n" + b"0,1,1\n" * 200_000, "at most 1 MB"),
     ],
 )
-def test_wrong_map_said_beside(server: Server, content: bytes, told: str) -> None:
-    """What is wrong with a map is said beside it."""
+def test_what_is_wrong_with_a_map_is_said_beside_it(server: Server, content: bytes, told: str) -> None:
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as somebody:
         form = {"form_token": token_of(somebody.get("/loads/map").text), "thickness_mm": "2.25", "map": SMALL}
         answer = somebody.post("/loads/map", data=form, files={"file": ("pressed.csv", content)})

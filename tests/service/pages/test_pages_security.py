@@ -46,8 +46,7 @@ def anyone(server: Server) -> Iterator[httpx.Client]:
         yield client
 
 
-def test_every_page_policy_lets_nothing(anyone: httpx.Client) -> None:
-    """Every page has a policy that lets nothing in."""
+def test_every_page_has_a_policy_that_lets_nothing_in(anyone: httpx.Client) -> None:
     for path in ("/", "/design", "/nothing"):
         policy = anyone.get(path).headers["content-security-policy"]
         assert policy.startswith("default-src 'none'; script-src 'self';")
@@ -56,8 +55,7 @@ def test_every_page_policy_lets_nothing(anyone: httpx.Client) -> None:
         assert "unsafe-inline" not in policy.replace("style-src-attr 'unsafe-inline'", "")
 
 
-def test_behind_tls_cookie_goes_through_tls(anyone: httpx.Client) -> None:
-    """Behind tls the cookie goes through tls only."""
+def test_behind_tls_the_cookie_goes_through_tls_only(anyone: httpx.Client) -> None:
     plain, secure = anyone.get("/"), anyone.get("/", headers={"X-Forwarded-Proto": "https", "Cookie": "other=1"})
     assert "; secure" not in plain.headers["set-cookie"].lower()
     assert "; secure" in secure.headers["set-cookie"].lower()

@@ -104,10 +104,9 @@ def _other(_content: bytes) -> bytes:
         ],
     ),
 )
-def test_file_cannot_come_says_wrong(
+def test_a_file_that_cannot_come_in_says_what_is_wrong_with_it(
     sender: httpx.Client, empty: Server, export: bytes, spoil: Callable[[bytes], bytes], told: str
 ) -> None:
-    """A file that cannot come in says what is wrong with it."""
     shown = looked_at(sender, spoil(export))
     assert "It cannot be read" in shown
     assert told in shown
@@ -127,8 +126,7 @@ def test_an_exported_skin_comes_alone(sender: httpx.Client, export: bytes) -> No
 
 
 @pytest.mark.slow
-def test_bringing_skin_needs_session_s_form_done(empty: Server, export: bytes) -> None:
-    """Bringing a skin in needs the session s own form and is done once."""
+def test_bringing_a_skin_in_needs_the_sessions_own_form_and_is_done_once(empty: Server, export: bytes) -> None:
     server = empty
     with (
         httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as own,

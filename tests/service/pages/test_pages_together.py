@@ -73,8 +73,7 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, server: Server) ->
     context.close()
 
 
-def test_fleet_skin_nothing_diagnose_refused(server: Server) -> None:
-    """A fleet with a skin that has nothing to diagnose is refused in the form."""
+def test_a_fleet_with_a_skin_that_has_nothing_to_diagnose_is_refused_in_the_form(server: Server) -> None:
     sent_to(server, "bare-0", "a")
     (only,) = sent_to(server, "bare-1", "b")
     sent_to(server, "bare-2", "c")

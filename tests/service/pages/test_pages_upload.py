@@ -14,8 +14,7 @@ GAIN = 7.4
 TEMPLATE = ROOT / "examples" / "formats" / "template.csv"
 
 
-def test_bad_recording_explained_field_field(visitor: Visit, server: Server) -> None:
-    """A bad recording is explained field by field."""
+def test_a_bad_recording_is_explained_field_by_field(visitor: Visit, server: Server) -> None:
     document = campaign("one bad", id="one-bad")
     document["recordings"][1] |= {"preload_n": -2.0, "sensor": "nowhere"}
     look_at(visitor, [file("one bad.json", as_json(document))])
@@ -31,8 +30,7 @@ def test_bad_recording_explained_field_field(visitor: Visit, server: Server) -> 
 
 
 @pytest.mark.soak
-def test_rig_description_reads_recording_form(visitor: Visit, server: Server) -> None:
-    """A rig description reads a recording and its form keeps what it says."""
+def test_a_rig_description_reads_a_recording_and_its_form_keeps_what_it_says(visitor: Visit, server: Server) -> None:
     page = visitor.page
     look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG, skin="shaker")
     page.get_by_text("1 recording understood").wait_for()

@@ -39,8 +39,7 @@ def scaled(document: dict[str, Any], factor: float) -> dict[str, Any]:
         (-1.0, "negative: is the sign of charge or force turned?"),
     ],
 )
-def test_d33_no_sensor_said_before_kept(server: Server, factor: float, said: str) -> None:
-    """A d33 that no sensor has is said before it is kept."""
+def test_a_d33_that_no_sensor_has_is_said_before_it_is_kept(server: Server, factor: float, said: str) -> None:
     page = looked_at(server, "slip.json", as_json(scaled(campaign("slip", id="slips"), factor)))
     (line,) = [line for line in page.splitlines() if "before you keep it" in line]
     assert "d33 of the array is" in line
@@ -48,8 +47,7 @@ def test_d33_no_sensor_said_before_kept(server: Server, factor: float, said: str
     assert page.index("before you keep it") < page.index("<button>Keep")
 
 
-def test_recordings_here_already_named_campaign(server: Server) -> None:
-    """Recordings that are here already are named with their campaign."""
+def test_recordings_that_are_here_already_are_named_with_their_campaign(server: Server) -> None:
     document = campaign("first monday", id="twice")
     assert "before you keep it" not in looked_at(server, "monday.json", as_json(document))
     kept = server.http.post("/v1/campaigns", json=document).json()
@@ -69,8 +67,7 @@ def test_recordings_here_already_named_campaign(server: Server) -> None:
     assert told not in looked_at(server, "after.json", as_json(renamed))
 
 
-def test_correction_names_skin_offered_corrects(server: Server) -> None:
-    """A correction that names another skin is offered the one it corrects."""
+def test_a_correction_that_names_another_skin_is_offered_the_one_it_corrects(server: Server) -> None:
     wrong = server.http.post("/v1/campaigns", json=campaign("slip", id="old"), params={"skin": "old"}).json()["id"]
     page = looked_at(server, "right.json", as_json(campaign("right", id="new")), corrects=wrong)
     assert "the file names skin new, not old, that of the campaign that it corrects" in page
@@ -107,8 +104,7 @@ channels: {force_n: {channel: Force}, charge_pc: {channel: Charge}}
 """
 
 
-def test_stated_preload_held_against_force_file(server: Server) -> None:
-    """A stated preload is held against the force of each file."""
+def test_a_stated_preload_is_held_against_the_force_of_each_file(server: Server) -> None:
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         form = {"form_token": token_of(client.get("/upload").text)}
         files = [("file", (f"{force}.tdms", shaken(force))) for force in (1.0, 2.0)]

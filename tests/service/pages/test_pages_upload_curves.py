@@ -88,8 +88,7 @@ def client(server: Server) -> Any:
         yield opened
 
 
-def test_curve_drawn_before_anything_else_known(client: httpx.Client) -> None:
-    """A curve is drawn before anything else is known."""
+def test_a_curve_is_drawn_before_anything_else_is_known(client: httpx.Client) -> None:
     upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN}))
     assert "<b>No recording</b> understood yet" in upload.page
     depth, force = upload.curve
@@ -101,8 +100,7 @@ def test_curve_drawn_before_anything_else_known(client: httpx.Client) -> None:
     assert upload.page.index('id="figure-curves"') < upload.page.index('id="mapping"')
 
 
-def test_force_depth_come_deflection_form(client: httpx.Client) -> None:
-    """Force and depth come from a deflection in the form."""
+def test_force_and_depth_come_from_a_deflection_in_the_form(client: httpx.Client) -> None:
     raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
     stated = Upload(client, table(raw, "k (N/m)\t3"))
     assert stated.curve[1] == pytest.approx(1e-6 * FORCE_UN, rel=1e-5)

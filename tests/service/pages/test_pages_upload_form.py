@@ -47,8 +47,7 @@ def test_alike_refusals_are_told_once(visitor: Visit) -> None:
     visitor.require_accessible()
 
 
-def test_two_channels_field_pointed_out_refused(visitor: Visit) -> None:
-    """Two channels for one field are pointed out and refused."""
+def test_two_channels_for_one_field_are_pointed_out_and_refused(visitor: Visit) -> None:
     page = visitor.page
     look_at(visitor, [file("two forces.csv", TWO_FORCES)])
     assert "Force right [N] may be force as well as Force left [N]" in page.get_by_role("main").inner_text()

@@ -51,8 +51,7 @@ def binary(server: Server, skin: str) -> list[tuple[str, bytes]]:
     return [(f"{number}.h5", content) for number in range(FILES)]
 
 
-def test_files_read_upload_makes_room_read(small: Server) -> None:
-    """Files that are read while their upload makes room are read."""
+def test_files_that_are_read_while_their_upload_makes_room_are_read(small: Server) -> None:
     files = binary(small, "read")
     with browser(small) as client, ThreadPoolExecutor(1) as pool:
         sending = pool.submit(send, client, files)
@@ -65,8 +64,7 @@ def test_files_read_upload_makes_room_read(small: Server) -> None:
 
 
 @pytest.mark.soak
-def test_being_kept_upload_makes_room_kept(small: Server) -> None:
-    """What is being kept while its upload makes room is kept."""
+def test_what_is_being_kept_while_its_upload_makes_room_is_kept(small: Server) -> None:
     files = binary(small, "kept")
     with browser(small) as client, ThreadPoolExecutor(1) as pool:
         place = send(client, files).headers["location"]
@@ -82,8 +80,7 @@ def test_being_kept_upload_makes_room_kept(small: Server) -> None:
         time.sleep(0.05)
 
 
-def test_upload_beyond_limit_refused_page(small: Server) -> None:
-    """An upload beyond the limit is refused on a page."""
+def test_an_upload_beyond_the_limit_is_refused_on_a_page(small: Server) -> None:
     with browser(small) as client:
         answer = send(client, [("a.csv", b"1,2\n" * 200_000)])
     assert answer.status_code == 413

@@ -25,8 +25,7 @@ def posted(client: httpx.Client, name: str = "by hand") -> str:
     return answer.headers["location"]
 
 
-def test_kept_twice_kept_once_discarded_taken(sender: httpx.Client, server: Server) -> None:
-    """Kept twice is kept once and what is discarded can be taken back."""
+def test_kept_twice_is_kept_once_and_what_is_discarded_can_be_taken_back(sender: httpx.Client, server: Server) -> None:
     place = posted(sender, "twice")
     form = {"form_token": token_of(sender.get(place).text), "skin": "twice"}
     first, second = (sender.post(f"{place}/keep", data=form) for _ in range(2))

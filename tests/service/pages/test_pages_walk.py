@@ -67,8 +67,7 @@ def test_what_is_not_there_is_said_on_a_page(visitor: Visit) -> None:
     assert visitor.wrong.pop().startswith("Failed to load resource")  # the browser says so of every 404
 
 
-def test_slider_design_view_answers_once(newcomer: Visit) -> None:
-    """A slider of the design view answers at once."""
+def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
     page = newcomer.page
     page.get_by_role("link", name="Design view").click()
     newcomer.drawn(2)

@@ -24,8 +24,7 @@ from underskin.findings.codes import FindingCode
         ((7.0, 7.0, 7.0), "7.000 (95 %: 7.000 to 7.000)"),
     ],
 )
-def test_digits_value_interval_agree(numbers: tuple[float, float, float], shown: str) -> None:
-    """Digits of a value and its interval agree."""
+def test_digits_of_a_value_and_its_interval_agree(numbers: tuple[float, float, float], shown: str) -> None:
     assert re.sub("<[^>]*>", "", interval(*numbers)) == shown
     places = {len(part.partition(".")[2]) for part in re.findall(r"[\d.]+", shown.replace("95 %", ""))}
     ends = [re.sub("<[^>]*>", "", end_of(one, *numbers[1:])) for one in numbers]

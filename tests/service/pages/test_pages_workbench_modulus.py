@@ -48,8 +48,7 @@ def kept_by_page(server: Server, text: str, skin: str) -> None:
         client.post(f"{address}/keep", data={"skin": skin} | token)
 
 
-def test_instrument_s_template_reads_next_file(server: Server) -> None:
-    """An instrument s template reads its next file."""
+def test_an_instruments_template_reads_its_next_file(server: Server) -> None:
     text = text_of_raw_curve(above="# template")
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         for day in ("monday", "tuesday"):
@@ -73,11 +72,8 @@ def test_instrument_s_template_reads_next_file(server: Server) -> None:
     assert forces[0] == forces[1]
 
 
-def test_depth_several_channels_not_flipped(server: Server) -> None:
-    """A depth of several channels is not flipped as a whole.
-
-    Height less deflection, of a height that falls, is no depth turned round: the modulus would be wrong.
-    """
+def test_a_depth_of_several_channels_is_not_flipped_as_a_whole(server: Server) -> None:
+    """Height less deflection, of a height that falls, is no depth turned round: the modulus would be wrong."""
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as client:
         token = {"form_token": token_of(client.get("/upload").text)}
         text = text_of_raw_curve(above="# not flipped").encode()
@@ -93,8 +89,7 @@ def test_depth_several_channels_not_flipped(server: Server) -> None:
 
 
 @pytest.mark.slow
-def test_raw_curve_gives_known_modulus_every_way(server: Server, tmp_path: Path) -> None:
-    """A raw curve gives the known modulus by every way in."""
+def test_a_raw_curve_gives_the_known_modulus_by_every_way_in(server: Server, tmp_path: Path) -> None:
     text = text_of_raw_curve(noise_nm=2, seed=900411)
     kept_by_page(server, text, "afm-page")
     rig, curve = tmp_path / "rig.json", tmp_path / "afm.txt"

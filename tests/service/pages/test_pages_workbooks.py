@@ -15,8 +15,7 @@ from tests.support.store_server import Place, campaign, running
 @pytest.mark.soak
 @pytest.mark.alone
 @pytest.mark.parametrize("path", ["/campaigns/{id}/frf.xlsx", "/design/search", "/design/search/region.csv"])
-def test_many_long_answers_leave_threads_pages(tmp_path: Path, path: str) -> None:
-    """Many long answers leave threads for other pages."""
+def test_many_long_answers_leave_threads_for_other_pages(tmp_path: Path, path: str) -> None:
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:
         path = path.format(**server.http.post("/v1/campaigns", json=campaign("long", lines=1000)).json())
         times = []

@@ -94,8 +94,7 @@ def test_all_that_is_wrong_is_told_at_once(
     assert {field: ids.split() for field, ids in marked.items()} == expected
 
 
-def test_wrong_field_described_sentence(visitor: Visit) -> None:
-    """A wrong field is described by its sentence."""
+def test_a_wrong_field_is_described_by_its_sentence(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/design?thickness_mm=zwei&preload_n=-1")
     for width in first(1, (390, 1280)):

@@ -39,8 +39,7 @@ def form_of(document: dict[str, Any]) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("file", RIGS, ids=lambda file: str(file.stem))
-def test_form_nobody_changed_says(file: Path) -> None:
-    """A form that nobody changed says the same."""
+def test_a_form_that_nobody_changed_says_the_same(file: Path) -> None:
     document = yaml.safe_load(file.read_text())
     found, wrong = document_of(form_of(document), document)
     rig_description.from_dict(found)
@@ -74,8 +73,7 @@ def test_columns_of_a_long_table() -> None:
     rig_description.from_dict(said)
 
 
-def test_channels_file_states_guessed_unit_name() -> None:
-    """Channels and what a file states are guessed by unit and name."""
+def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
     channels = [channel("Kraftmessdose", "mN"), channel("Charge amplifier", "V"), channel("temperature", "V")]
     found = guessed(channels, {"preload [mN]": 500.0, "sensor": "s01", "operator": "me"}, {"thickness_mm": 2.5})
     assert found["kind"] == "frf"
@@ -90,8 +88,7 @@ def test_channels_file_states_guessed_unit_name() -> None:
     assert set(curve["channels"]) == {"displacement_mm", "force_n", "time_s"}
 
 
-def test_time_typed_lab_s_zone_shown_typed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A time is typed in the lab s zone and shown as it was typed."""
+def test_a_time_is_typed_in_the_labs_zone_and_shown_as_it_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Rome")
     for typed in ("2026-05-03 14:30", "3.5.2026 14:30", "2026-05-03T12:30Z"):
         found, wrong = document_of({"recorded_at": typed}, {})
@@ -108,8 +105,7 @@ def test_time_typed_lab_s_zone_shown_typed(monkeypatch: pytest.MonkeyPatch) -> N
     assert "two days, 3 May 2026 or 5 March 2026: write it as 2026-05-03 or 2026-03-05" in ambiguous.allowed
 
 
-def test_file_states_time_taken_word() -> None:
-    """A file that states its time is taken at its word."""
+def test_a_file_that_states_its_time_is_taken_at_its_word() -> None:
     channels = [channel("force", "N"), channel("charge", "pC")]
     for name, value in (("Date/Time", "03.05.2026 14:30"), ("recorded_at", "2026-05-03T14:30")):
         assert guessed(channels, {name: value}, {})["recording"] == {"recorded_at": {"property": name}}
@@ -130,8 +126,7 @@ SPRUNG = {
 }
 
 
-def test_deflection_form_makes_force_depth() -> None:
-    """A deflection in the form makes force and depth."""
+def test_a_deflection_in_the_form_makes_force_and_depth() -> None:
     form = {"kind": "indentation", "channel-0": "z", "is-0": "displacement_mm", "sign-0": "-1"}
     form |= {"channel-1": "d", "is-1": "deflection", "unit-1": "nm", "spring_constant_n_per_m": "3"}
     assert document_of({**form, "travel": "yes"}, {})[0]["channels"] == SPRUNG

@@ -22,8 +22,7 @@ def form_of(document: dict[str, Any], **changes: str) -> dict[str, str]:
     return form | changes
 
 
-def test_form_nobody_changed_says() -> None:
-    """A form that nobody changed says the same."""
+def test_a_form_that_nobody_changed_says_the_same() -> None:
     document = rig_of_raw_curve(trim={"first_sample": 3, "last_sample": 90})
     found, wrong = document_of(form_of(document), document)
     assert wrong == []
@@ -39,8 +38,7 @@ def test_form_nobody_changed_says() -> None:
 
 
 @pytest.mark.parametrize("number", ["007", "9" * 4301, "\u0663", "-1"], ids=["zeros", "long", "digits", "sign"])
-def test_name_page_not_write_no_row(number: str) -> None:
-    """A name that the page does not write is no row."""
+def test_a_name_that_the_page_does_not_write_is_no_row(number: str) -> None:
     document = rig_of_raw_curve()
     forged = {f"derived-formula-{number}": "5 * 'Piezo'", f"derived-is-{number}": "force_n"}
     found, wrong = document_of(form_of(document, **forged), document)
@@ -48,8 +46,7 @@ def test_name_page_not_write_no_row(number: str) -> None:
     assert wrong == []
 
 
-def test_template_holds_instrument_s_alone() -> None:
-    """A template holds what is the instrument s alone."""
+def test_a_template_holds_what_is_the_instruments_alone() -> None:
     skin = {"poisson_ratio": 0.5, "thickness_mm": 2}
     recording = {"indenter_radius_mm": 0.0075, "sensor": "s01", "recorded_at": {"property": "Date"}}
     rig = rig_description.from_dict(rig_of_raw_curve(skin=skin, recording=recording))
@@ -61,8 +58,7 @@ def test_template_holds_instrument_s_alone() -> None:
     assert again.derived.keys() == rig.derived.keys()
 
 
-def test_typed_value_counts_property() -> None:
-    """A typed value counts for more than a property that is still chosen."""
+def test_a_typed_value_counts_for_more_than_a_property_that_is_still_chosen() -> None:
     form = {"kind": "indentation", "indenter_radius_mm": "2", "indenter_radius_mm-from": "Tip radius [mm]"}
     assert document_of(form, {})[0]["recording"]["indenter_radius_mm"] == 2
     assert document_of(form | {"indenter_radius_mm": " "}, {})[0]["recording"]["indenter_radius_mm"] == {

@@ -64,8 +64,7 @@ def test_a_recording_with_every_field_is_valid(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", RECORDINGS)
-def test_reader_schema_agree_every_field(kind: str) -> None:
-    """Reader and schema agree on every field of a recording."""
+def test_reader_and_schema_agree_on_every_field_of_a_recording(kind: str) -> None:
     known = {
         *RECORDINGS[kind],
         "kind",
@@ -80,8 +79,7 @@ def test_reader_schema_agree_every_field(kind: str) -> None:
     agree(document(RECORDINGS[kind]), ("recordings", 0), known)
 
 
-def test_reader_schema_agree_every_field_skin() -> None:
-    """Reader and schema agree on every field of a skin and its sensors."""
+def test_reader_and_schema_agree_on_every_field_of_a_skin_and_its_sensors() -> None:
     campaign = document(RECORDINGS["compression"])
     agree(campaign, ("skin",), {*campaign["skin"], "nonsense"})
     agree(campaign, ("skin", "sensors", 0), {"id", "x_mm", "y_mm", "nonsense"})
@@ -119,8 +117,7 @@ def beyond(name: str, error: InvalidInput) -> bool:
     return name in ("sensor", "recorded_at", "sensors") or error.place.startswith("skin.")
 
 
-def test_document_gives_back_schema_describes(http: httpx.Client) -> None:
-    """The document gives back what the schema describes."""
+def test_the_document_gives_back_what_the_schema_describes(http: httpx.Client) -> None:
     campaign = document(*RECORDINGS.values(), name="every kind")
     sent = http.post("/v1/campaigns", json=campaign).json()
     assert {entry["status"] for entry in sent["recordings"]} == {"ok"}

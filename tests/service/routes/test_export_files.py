@@ -16,11 +16,8 @@ BACKEND = "sqlite"
 
 
 @pytest.mark.parametrize("asked", ["bytes=999999999-", "bytes=5-9", "lines=1-2", "bytes=-5, 7-8"])
-def test_sent_whole_leave_nothing_behind(server: Server, asked: str) -> None:
-    """They are sent whole and leave nothing behind.
-
-    That of the next request has other bytes: parts of two are no file.
-    """
+def test_they_are_sent_whole_and_leave_nothing_behind(server: Server, asked: str) -> None:
+    """That of the next request has other bytes: parts of two are no file."""
     sent = server.http.post("/v1/campaigns?skin=palm", json=campaign("monday")).json()
     for path in ("/v1/skins/palm/export", f"/v1/campaigns/{sent['id']}/document?format=hdf5"):
         answer = server.http.get(path, headers={"Range": asked})

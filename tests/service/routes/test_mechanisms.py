@@ -68,8 +68,7 @@ def warmed() -> dict[str, object]:
     return to_dict(replace(quiet, recordings=tuple(recordings)))
 
 
-def test_law_found_kept_under_name_recognised(lab: Server, client: Client) -> None:
-    """A law is found kept under a name recognised and left out again."""
+def test_a_law_is_found_kept_under_a_name_recognised_and_left_out_again(lab: Server, client: Client) -> None:
     campaign_id = sent(lab, warmed())
 
     def diagnosed(*without: str) -> Diagnosis:
@@ -100,8 +99,7 @@ def test_law_found_kept_under_name_recognised(lab: Server, client: Client) -> No
     assert [file.name.split()[0] for file in (lab.place.folder / "mechanisms" / "discarded").iterdir()]
 
 
-def test_document_kept_once_nothing_else(lab: Server, client: Client) -> None:
-    """A document is kept once and nothing else can be discarded."""
+def test_a_document_is_kept_once_and_nothing_else_can_be_discarded(lab: Server, client: Client) -> None:
     assert client.mechanisms.keep(WARM)["parameters"] == [{"name": "rise", "unit": "1/°C", "low": -0.1, "high": 0.1}]
     with pytest.raises(ServiceError, match="taken"):
         client.mechanisms.keep(WARM)
@@ -136,8 +134,7 @@ REFUSED = (
 )
 
 
-def test_cannot_kept_refused_reason(lab: Server) -> None:
-    """What cannot be kept is refused with its reason."""
+def test_what_cannot_be_kept_is_refused_with_its_reason(lab: Server) -> None:
     for body, status, said in first(8, REFUSED):
         kind = "application/json" if body.startswith("{") else "application/yaml"
         answer = lab.http.post("/v1/mechanisms", content=body.encode(), headers={"Content-Type": kind})
@@ -146,8 +143,7 @@ def test_cannot_kept_refused_reason(lab: Server) -> None:
     assert not folder.exists() or not list(folder.iterdir())
 
 
-def test_file_cannot_used_named_until_mended(lab: Server, client: Client) -> None:
-    """A file that cannot be used is named until it is mended."""
+def test_a_file_that_cannot_be_used_is_named_until_it_is_mended(lab: Server, client: Client) -> None:
     file = lab.place.folder / "mechanisms" / "warm.yaml"
     campaign_id = sent(lab, warmed())
     file.parent.mkdir()

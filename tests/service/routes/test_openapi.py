@@ -110,8 +110,7 @@ def test_operation_ids_are_stable(document: dict[str, Any]) -> None:
     assert {(method, path): operation["operationId"] for method, path, operation in operations(document)} == OPERATIONS
 
 
-def test_every_route_application_document(document: dict[str, Any]) -> None:
-    """Every route of the application is in the document."""
+def test_every_route_of_the_application_is_in_the_document(document: dict[str, Any]) -> None:
     names = [found.name for found in pkgutil.walk_packages(routes.__path__, f"{routes.__name__}.")]
     routers = [router for name in names if (router := getattr(importlib.import_module(name), "router", None))]
     there = [route for router in routers for route in router.routes if isinstance(route, APIRoute)]
@@ -176,8 +175,7 @@ def query(operation: dict[str, Any]) -> dict[str, Any]:
     return {name: schema["examples"][0] for name, schema in schemas.items() if "examples" in schema}
 
 
-def test_examples_accepted_answered_described(http: httpx.Client, document: dict[str, Any]) -> None:
-    """The examples are accepted and answered as described."""
+def test_the_examples_are_accepted_and_answered_as_described(http: httpx.Client, document: dict[str, Any]) -> None:
     for method, path, operation in operations(document):
         if "{" in path or path in ("/v1/skins/import", "/v1/fleets/diagnosis"):
             continue  # about what is kept already: tests/service/store
@@ -195,8 +193,7 @@ def test_examples_accepted_answered_described(http: httpx.Client, document: dict
                 validator(schema, document).validate(answer.json())
 
 
-def test_key_asked_document_needed(document: dict[str, Any], locked: Server) -> None:
-    """A key is asked for in the document where one is needed."""
+def test_a_key_is_asked_for_in_the_document_where_one_is_needed(document: dict[str, Any], locked: Server) -> None:
     assert "security" not in document
     with httpx.Client(base_url=locked.url, headers=authorization(locked), timeout=300) as client:
         described = client.get("/openapi.json").json()

@@ -42,8 +42,7 @@ def contents(operation: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, An
             yield status, media_type, content
 
 
-def test_every_request_every_answer_valid(document: dict[str, Any]) -> None:
-    """Every request and every answer has a valid example."""
+def test_every_request_and_every_answer_has_a_valid_example(document: dict[str, Any]) -> None:
     checked = 0
     for operation in operations(document):
         for where, media_type, content in contents(operation):
@@ -58,8 +57,7 @@ def test_every_request_every_answer_valid(document: dict[str, Any]) -> None:
     assert checked > 120
 
 
-def test_every_parameter_required_example(document: dict[str, Any]) -> None:
-    """Every parameter that is required has an example."""
+def test_every_parameter_that_is_required_has_an_example(document: dict[str, Any]) -> None:
     required = [
         parameter
         for operation in operations(document)
@@ -70,8 +68,7 @@ def test_every_parameter_required_example(document: dict[str, Any]) -> None:
     assert [parameter["name"] for parameter in required if "example" not in parameter] == []
 
 
-def test_every_property_every_schema_described(document: dict[str, Any]) -> None:
-    """Every property of every schema is described."""
+def test_every_property_of_every_schema_is_described(document: dict[str, Any]) -> None:
     described = 0
     for name, schema in document["components"]["schemas"].items():
         assert schema.get("description"), name

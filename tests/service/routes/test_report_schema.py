@@ -87,8 +87,7 @@ def test_a_report_of_every_verdict_is_described(verdict: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", first(2, KINDS))
-def test_report_every_kind_recording_described(kind: str) -> None:
-    """A report on every kind of recording is described."""
+def test_a_report_on_every_kind_of_recording_is_described(kind: str) -> None:
     require_described(
         lean_report(KINDS[kind](), table(), *(BESIDE_SKINS if kind in ("words", "FRFs and a block") else COSTLY))
     )

@@ -50,8 +50,7 @@ def test_csv_both_ways_is_the_json_answer(http: httpx.Client) -> None:
     assert columns["sigma"][2] == "NaN"
 
 
-def test_health_answered_large_batch_computed(server_url: str) -> None:
-    """Health is answered while a large batch is computed."""
+def test_health_is_answered_while_a_large_batch_is_computed(server_url: str) -> None:
     rows = 400_000
     body = {"a_over_h": np.linspace(0, 3, rows).tolist(), "rt_over_h": 0.6, "load_parameter": 0.01}
     with ThreadPoolExecutor(1) as threads, httpx.Client(base_url=server_url, timeout=300) as client:

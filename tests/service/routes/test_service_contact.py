@@ -75,8 +75,7 @@ def test_refused(http: httpx.Client) -> None:
     assert "'paper' or 'solved'" in error["allowed"]
 
 
-def test_design(http: httpx.Client) -> None:
-    """A design is of the solved contact unless the paper's is asked for."""
+def test_a_design_is_of_the_solved_contact_unless_the_papers_is_asked_for(http: httpx.Client) -> None:
     asked = {**SPHERE, "pitch_mm": 1.0}
     unasked, paper = posted(http, "design", **asked), posted(http, "design", **asked, contact="paper")
     assert (unasked["contact"], paper["contact"]) == ("solved", "paper")

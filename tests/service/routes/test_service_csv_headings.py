@@ -21,8 +21,7 @@ def errors(answer: httpx.Response) -> list[dict[str, Any]]:
     return found
 
 
-def test_misspelt_field_guessed_csv_json(http: httpx.Client) -> None:
-    """A misspelt field is guessed in csv and json."""
+def test_a_misspelt_field_is_guessed_in_csv_and_json(http: httpx.Client) -> None:
     columns = {**SKIN, "prelaod_n": 1, "frf_pc_per_n": 7}
     for answer, value in ((sent(http, "/v1/d33", columns), "1"), (http.post("/v1/d33", json=columns), 1)):
         _, misspelt = errors(answer)
@@ -44,11 +43,8 @@ def test_magnitude_and_phase_are_the_real_part(http: httpx.Client, phase: str) -
     ]
 
 
-def test_read_otherwise_heading_says_told(http: httpx.Client) -> None:
-    """What was read otherwise than its heading says is told.
-
-    In a header of the answer, since columns have no room for it.
-    """
+def test_what_was_read_otherwise_than_its_heading_says_is_told(http: httpx.Client) -> None:
+    """In a header of the answer, since columns have no room for it."""
     columns = {**SKIN, "preload_n": 1, "d33_pc_per_n": 14}
     plain = sent(http, "/v1/frf", columns)
     assert "Underskin-Notes" not in plain.headers

@@ -107,8 +107,7 @@ def test_d33_no_sensor_answered_said(http: httpx.Client, frf: Any, index: int | 
     assert ("(1 more rows like it)" in finding["statement"]) == (index == 1)
 
 
-def test_rows_outside_null_spoil(http: httpx.Client) -> None:
-    """Rows outside are null and spoil no other."""
+def test_rows_outside_are_null_and_spoil_no_other(http: httpx.Client) -> None:
     frf: dict[str, Any] = {"frf_pc_per_n": [7.4, 7.4, 7.4], "frf_uncertainty_pc_per_n": 0.1}
     answer = posted(http, preload_n=[1, 300, 1], poisson_ratio=[0.5, 0.5, 0.45], **frf)
     assert answer["status"] == ["ok", "out_of_domain", "out_of_domain"]

@@ -28,8 +28,7 @@ def asked(http: httpx.Client, **changed: Any) -> dict[str, Any]:
     return answer
 
 
-def test_agrees_frf_says_contact(http: httpx.Client) -> None:
-    """It agrees with what frf says of the same contact."""
+def test_it_agrees_with_what_frf_says_of_the_same_contact(http: httpx.Client) -> None:
     found = asked(http)
     frf = http.post("/v1/frf", json={**SPHERE, "d33_pc_per_n": 14.0}).json()
     for name in ("contact_radius_mm", "a_over_h", "load_parameter", "sigma", "mean_stress_mpa", "rel_error"):
@@ -38,8 +37,7 @@ def test_agrees_frf_says_contact(http: httpx.Client) -> None:
     assert found["table_sha256"] == frf["table_sha256"]
 
 
-def test_section_hertz_s_pressure_above_sensor_s(http: httpx.Client) -> None:
-    """The section has hertz s pressure above and the sensor s stress below."""
+def test_the_section_has_hertzs_pressure_above_and_the_sensors_stress_below(http: httpx.Client) -> None:
     found = asked(http, r_points=301, depth_points=3)
     r, stress = np.array(found["r_mm"]), np.array(found["sigma_zz_mpa"])
     assert stress.shape == (3, 301)
@@ -52,8 +50,7 @@ def test_section_hertz_s_pressure_above_sensor_s(http: httpx.Client) -> None:
     assert mean == pytest.approx(-found["mean_stress_mpa"], rel=0.01)
 
 
-def test_outside_table_says_limit_no_stress(http: httpx.Client) -> None:
-    """Outside the table it says which limit and has no stress."""
+def test_outside_the_table_it_says_which_limit_and_has_no_stress(http: httpx.Client) -> None:
     for ratio in (0.5, 0.3):
         found = asked(http, preload_n=100, poisson_ratio=ratio)
         assert found["status"] == "out_of_domain"
@@ -88,8 +85,7 @@ def test_what_cannot_be_used_is_named(http: httpx.Client, changed: dict[str, Any
     assert (error["field"], error["code"]) == (field, code)
 
 
-def test_client_command_numbers(http: httpx.Client, server_url: str) -> None:
-    """Client and command have the same numbers."""
+def test_client_and_command_have_the_same_numbers(http: httpx.Client, server_url: str) -> None:
     expected = asked(http, r_points=5, depth_points=3)
     with Client(server_url) as client:
         found = client.field(**SPHERE, r_points=5, depth_points=3)

@@ -74,11 +74,8 @@ def test_columns_are_the_librarys(http: httpx.Client) -> None:
         assert np.array(answer[name], dtype=float) == pytest.approx(values, rel=1e-13, nan_ok=True), name
 
 
-def test_rows_outside_keep_not_depend_table(http: httpx.Client) -> None:
-    """Rows outside keep what does not depend on the table.
-
-    ν = 0.49 and too high a load: the contact is still told, σ and what follows is null.
-    """
+def test_rows_outside_keep_what_does_not_depend_on_the_table(http: httpx.Client) -> None:
+    """ν = 0.49 and too high a load: the contact is still told, σ and what follows is null."""
     answer = posted(http, preload_n=[1, 1, 300], poisson_ratio=[0.5, 0.49, 0.5])
     assert answer["status"] == ["ok", "out_of_domain", "out_of_domain"]
     for name in ("sigma", "rel_error", "mean_stress_mpa", "frf_pc_per_n"):
@@ -98,8 +95,7 @@ def test_spectra_are_flat_and_real(http: httpx.Client) -> None:
     assert "frf_re_pc_per_n" not in posted(http)
 
 
-def test_spectra_csv_column_frequency(http: httpx.Client) -> None:
-    """Spectra in csv have a column a frequency."""
+def test_spectra_in_csv_have_a_column_a_frequency(http: httpx.Client) -> None:
     body = PROTOTYPE | {"preload_n": [1, 300], "frequency_hz": [10.5, 130]}
     reply = http.post("/v1/frf", json=body, headers={"Accept": "text/csv"})
     assert reply.headers["underskin-model"] == "paper"
@@ -122,11 +118,8 @@ def test_spectra_have_a_limit_that_is_told(http: httpx.Client) -> None:
     assert "at most 1000000" in error["allowed"]
 
 
-def test_unusual_magnitudes_pass_once_confirmed(http: httpx.Client) -> None:
-    """Unusual magnitudes pass once they are confirmed.
-
-    A skin a thousand times as large in all lengths, and as stiff, answers the same.
-    """
+def test_unusual_magnitudes_pass_once_they_are_confirmed(http: httpx.Client) -> None:
+    """A skin a thousand times as large in all lengths, and as stiff, answers the same."""
     large = {name: 1e3 * PROTOTYPE[name] for name in ("thickness_mm", "sensor_radius_mm", "indenter_radius_mm")}
     refused = http.post("/v1/frf", json=PROTOTYPE | large | {"preload_n": 1e6})
     assert refused.status_code == 422
@@ -134,8 +127,7 @@ def test_unusual_magnitudes_pass_once_confirmed(http: httpx.Client) -> None:
     assert answer["frf_pc_per_n"] == pytest.approx(posted(http)["frf_pc_per_n"], rel=1e-12)
 
 
-def test_overflows_outside_spoils(http: httpx.Client) -> None:
-    """What overflows is outside and spoils no other."""
+def test_what_overflows_is_outside_and_spoils_no_other(http: httpx.Client) -> None:
     answer = posted(http, preload_n=[1, 1e308], indenter_radius_mm=[4, 1e308], units_checked=True)
     assert answer["status"] == ["ok", "out_of_domain"]
     assert answer["frf_pc_per_n"] == [posted(http)["frf_pc_per_n"][0], None]

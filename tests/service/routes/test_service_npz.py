@@ -104,8 +104,7 @@ def test_arrays_are_answered_as_json_is(http: httpx.Client, path: str, fields: d
         zipped([("a_over_h", npy(np.array([0.5, 1.0]))), ("rt_over_h.npy", npy(0.5))], zipfile.ZIP_DEFLATED),
     ],
 )
-def test_whatever_holds_numbers_read_alike(http: httpx.Client, body: bytes) -> None:
-    """Whatever holds the same numbers is read alike."""
+def test_whatever_holds_the_same_numbers_is_read_alike(http: httpx.Client, body: bytes) -> None:
     expected = http.post("/v1/sigma", json={"a_over_h": [0.5, 1.0], "rt_over_h": 0.5}).json()
     assert post(http, "/v1/sigma", body).json() == expected
 
@@ -216,8 +215,7 @@ def test_what_is_no_archive_is_said(http: httpx.Client, body: bytes) -> None:
     assert "The body is not an .npz file" in problem_of(post(http, "/v1/sigma", body), 400)["detail"]
 
 
-def test_header_no_parser_bears_refused(http: httpx.Client) -> None:
-    """A header that no parser bears is refused."""
+def test_a_header_that_no_parser_bears_is_refused(http: httpx.Client) -> None:
     buffer = io.BytesIO()
     header = b"-" * 9000 + b"1"
     with zipfile.ZipFile(buffer, "w") as file:
@@ -240,8 +238,7 @@ def test_a_long_directory_is_refused_unread(http: httpx.Client) -> None:
 LARGE = {"a_over_h": np.zeros(10_000_000), "rt_over_h": 0.6}
 
 
-def test_archive_expands_beyond_limit_refused(http: httpx.Client) -> None:
-    """An archive that expands beyond the limit is refused unread."""
+def test_an_archive_that_expands_beyond_the_limit_is_refused_unread(http: httpx.Client) -> None:
     body = archive(LARGE, np.savez_compressed)
     assert len(body) < 100_000
     problem = problem_of(post(http, "/v1/sigma", body), 413)
@@ -249,8 +246,7 @@ def test_archive_expands_beyond_limit_refused(http: httpx.Client) -> None:
 
 
 @pytest.mark.parametrize("declared", [144, 100_000])
-def test_archive_lies_about_size_refused(http: httpx.Client, declared: int) -> None:
-    """An archive that lies about its size is refused."""
+def test_an_archive_that_lies_about_its_size_is_refused(http: httpx.Client, declared: int) -> None:
     honest = archive(LARGE, np.savez_compressed)
     lying = honest.replace(struct.pack("<I", 80_000_128), struct.pack("<I", declared))
     assert lying != honest
@@ -258,8 +254,7 @@ def test_archive_lies_about_size_refused(http: httpx.Client, declared: int) -> N
     assert error["field"] == "a_over_h"
 
 
-def test_whatever_damaged_refused_never_failure(http: httpx.Client) -> None:
-    """Whatever is damaged is refused and never a failure."""
+def test_whatever_is_damaged_is_refused_and_never_a_failure(http: httpx.Client) -> None:
     whole = archive({**PLAIN, "model": "layer"}, np.savez_compressed)
     statuses = set()
     for _ in range(400):

@@ -38,11 +38,8 @@ def random_points(count: int, beyond: float = 1.0) -> dict[str, Floats]:
     return {name: GENERATOR.uniform(low, high * beyond, count) for name, (low, high) in TABLE.domain.items()}
 
 
-def test_point_alone_columns(http: httpx.Client) -> None:
-    """One point is the same alone and in columns.
-
-    Also where it is read differently: with `model` spelled out the API answers, without it the shorter path.
-    """
+def test_one_point_is_the_same_alone_and_in_columns(http: httpx.Client) -> None:
+    """Also where it is read differently: with `model` spelled out the API answers, without it the shorter path."""
     points = random_points(100, beyond=1.05)
     columns = posted(http, **points)
     for row in range(100):
@@ -104,8 +101,7 @@ def test_linear_limit_equals_the_exact_values(http: httpx.Client) -> None:
     assert answer["sigma"] == pytest.approx(value[used], rel=1e-5)
 
 
-def test_rows_outside_null_spoil(http: httpx.Client) -> None:
-    """Rows outside are null and spoil no other."""
+def test_rows_outside_are_null_and_spoil_no_other(http: httpx.Client) -> None:
     a, rho, load = [0.3, 3.01, 0.3, 0.3, 1e308, 3.0], [0.6, 0.6, 3.01, 0.6, 0.6, 3.0], [0.01, 0.01, 0.01, 0.101, 0, 0.1]
     answer = posted(http, a_over_h=a, rt_over_h=rho, load_parameter=load)
     outside = [False, True, True, True, True, False]

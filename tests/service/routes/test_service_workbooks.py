@@ -61,8 +61,7 @@ def test_of_several_sheets_one_must_be_named(http: httpx.Client) -> None:
     assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "sheet")
 
 
-def test_wrong_cell_said_csv(http: httpx.Client) -> None:
-    """What is wrong in a cell is said as of csv."""
+def test_what_is_wrong_in_a_cell_is_said_as_of_csv(http: httpx.Client) -> None:
     wrong: list[list[list[Any]]] = [[*POINTS[:2], ["much", 0.6]], [["a_over_h", "b_over_h"], [0.3, 1.5]]]
     for rows in wrong:
         of_csv = send(http, "/v1/sigma", as_csv(rows), "text/csv")

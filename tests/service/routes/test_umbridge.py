@@ -55,8 +55,7 @@ def differences(served: Any, point: list[float]) -> Floats:
 
 
 @pytest.mark.parametrize(("name", "point"), [(name, point) for name in POINTS for point in POINTS[name] if all(point)])
-def test_derivatives_agree_finite_differences(server_url: str, name: str, point: list[float]) -> None:
-    """Derivatives agree with finite differences."""
+def test_derivatives_agree_with_finite_differences(server_url: str, name: str, point: list[float]) -> None:
     served = model(server_url, name)
     slopes = differences(served, point)
     gradient = np.array(served.gradient(0, 0, [point], [2.5]))
@@ -67,8 +66,7 @@ def test_derivatives_agree_finite_differences(server_url: str, name: str, point:
     assert along == pytest.approx(gradient @ direction / 2.5, rel=1e-12)
 
 
-def test_infinite_derivative_zero_load_error(server_url: str) -> None:
-    """The infinite derivative at zero load is an error of the protocol."""
+def test_the_infinite_derivative_at_zero_load_is_an_error_of_the_protocol(server_url: str) -> None:
     served = model(server_url, "sigma")
     point = [[0.3, 0.6, 0.0]]
     with pytest.raises(Exception, match=r"InvalidInput.*load_parameter is infinite at 0"):

@@ -78,8 +78,7 @@ def test_what_cannot_be_kept_is_refused(server: Server, path: str, body: dict[st
     assert field in answer.text
 
 
-def test_trial_put_away_beside_campaigns_use(server: Server) -> None:
-    """A trial is put away beside campaigns in use."""
+def test_a_trial_is_put_away_beside_campaigns_in_use(server: Server) -> None:
     kept, trial = sent(server, "kept"), sent(server, "trial")
     answer = server.http.post(f"/v1/campaigns/{trial}/discard", json={"reason": "a trial"}).raise_for_status().json()
     assert (answer["state"], answer["withdraw_reason"]) == ("withdrawn", "a trial")
@@ -106,8 +105,7 @@ def test_what_something_builds_on_is_no_trial(server: Server) -> None:
         assert why in answer.json()["detail"]
 
 
-def test_correction_undone_until_something(server: Server) -> None:
-    """A correction is undone until something builds on it."""
+def test_a_correction_is_undone_until_something_builds_on_it(server: Server) -> None:
     older = sent(server, "older")
     newer = sent(server, "newer", corrects=older, reason="E was mistyped")
     assert history(server) == {newer}
@@ -141,8 +139,7 @@ def test_correction_skin_not_undone_once_skin_left(server: Server, client: under
     assert history(server, "hand") == {newer}
 
 
-def test_correction_corrected_undone_after_later(server: Server) -> None:
-    """A correction that was corrected is undone after the later one."""
+def test_a_correction_that_was_corrected_is_undone_after_the_later_one(server: Server) -> None:
     first = sent(server, "first")
     second = sent(server, "second", corrects=first, reason="E was mistyped")
     third = sent(server, "third", corrects=second, reason="and the sphere")

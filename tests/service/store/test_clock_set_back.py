@@ -46,8 +46,7 @@ def by_a_clock_ahead(store: Database, column: Column[str]) -> str:
     return ahead
 
 
-def test_model_adopted_after_clock_set_back(store: Database) -> None:
-    """A model adopted after a clock was set back is in force."""
+def test_a_model_adopted_after_a_clock_was_set_back_is_in_force(store: Database) -> None:
     first, second = (asked(store, kept(store, name)) for name in ("monday", "tuesday"))
     store.write(models.adopt, "palm", first, None)
     ahead = by_a_clock_ahead(store, model_rows.c.adopted_at)
@@ -61,8 +60,7 @@ def test_model_adopted_after_clock_set_back(store: Database) -> None:
     assert store.write(models.adopt, "palm", first, None).model_version == 3
 
 
-def test_diagnosis_leaves_out_excluded_asked(store: Database) -> None:
-    """A diagnosis leaves out what was excluded when it was asked for."""
+def test_a_diagnosis_leaves_out_what_was_excluded_when_it_was_asked_for(store: Database) -> None:
     campaign_id = kept(store, "monday")
     store.write(campaigns.exclude, campaign_id, "s0-2N", "cable loose", None)
     by_a_clock_ahead(store, recordings.c.excluded_at)
@@ -108,10 +106,9 @@ Change = Callable[[Database, str], str]  # of a store's campaign; the one that i
 
 @pytest.mark.parametrize("diagnose", [asked, asked_with_others])
 @pytest.mark.parametrize("change", [excluded, joined, corrected_to_another_skin])
-def test_change_clock_ahead_not_undone_once(
+def test_a_change_by_a_clock_ahead_is_not_undone_once_diagnosed(
     store: Database, change: Change, diagnose: Callable[[Database, str], object]
 ) -> None:
-    """A change by a clock ahead is not undone once diagnosed."""
     in_use = change(store, kept(store, "monday"))
     by_a_clock_ahead(store, change_rows.c.at)
     diagnose(store, in_use)
@@ -120,8 +117,7 @@ def test_change_clock_ahead_not_undone_once(
 
 
 @pytest.mark.parametrize("change", [excluded, joined])
-def test_change_after_diagnosis_clock_ahead(store: Database, change: Change) -> None:
-    """A change after a diagnosis by a clock ahead is undone."""
+def test_a_change_after_a_diagnosis_by_a_clock_ahead_is_undone(store: Database, change: Change) -> None:
     campaign_id = kept(store, "monday")
     asked(store, campaign_id)
     by_a_clock_ahead(store, diagnosis_rows.c.asked_at)

@@ -17,8 +17,7 @@ from tests.support.store_server import Place, campaign, running
 BACKEND = "sqlite"
 
 
-def test_doctor_finds_nothing_wrong_server_well(place: Place, tmp_path: Path) -> None:
-    """The doctor finds nothing wrong with a server that is well."""
+def test_the_doctor_finds_nothing_wrong_with_a_server_that_is_well(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     place.folder.chmod(0o700)
     with running(place, **scheduled(folder)) as server:
@@ -31,8 +30,7 @@ def test_doctor_finds_nothing_wrong_server_well(place: Place, tmp_path: Path) ->
     assert "trial diagnosis ended" in found["workers"]["found"]
 
 
-def test_doctor_tells_wrong(tmp_path: Path) -> None:
-    """The doctor tells what is wrong and what to do."""
+def test_the_doctor_tells_what_is_wrong_and_what_to_do(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     folder.mkdir()
     place = Place(folder)
@@ -77,8 +75,7 @@ def test_the_doctor_sees_a_damaged_store(tmp_path: Path) -> None:
         assert "backups" in found
 
 
-def test_doctor_sees_open_no_server_starts(tmp_path: Path) -> None:
-    """The doctor sees what others may open and what no server starts with."""
+def test_the_doctor_sees_what_others_may_open_and_what_no_server_starts_with(tmp_path: Path) -> None:
     place, backups = Place(tmp_path / "data"), tmp_path / "backups"
     place.folder.mkdir(0o700)
     with running(place, **scheduled(backups)):
@@ -103,8 +100,7 @@ def test_doctor_sees_open_no_server_starts(tmp_path: Path) -> None:
     assert (wrong.returncode, "UNDERSKIN_BACKUP_EVERY" in wrong.stderr) == (2, True)
 
 
-def test_doctor_tells_store_gone(tmp_path: Path) -> None:
-    """The doctor tells a store that is gone from one that never was."""
+def test_the_doctor_tells_a_store_that_is_gone_from_one_that_never_was(tmp_path: Path) -> None:
     place, backups = Place(tmp_path / "data"), tmp_path / "backups"
     place.folder.mkdir(0o700)
     settings = scheduled(backups)
@@ -122,11 +118,8 @@ def test_doctor_tells_store_gone(tmp_path: Path) -> None:
         assert (found["store"]["level"], "put underskin.sqlite3 back" in found["store"]["advice"]) == ("critical", True)
 
 
-def test_cannot_entered_finding_check(tmp_path: Path) -> None:
-    """What cannot be entered is a finding of each check.
-
-    As a data folder of another user, or a disk that does not answer.
-    """
+def test_what_cannot_be_entered_is_a_finding_of_each_check(tmp_path: Path) -> None:
+    """As a data folder of another user, or a disk that does not answer."""
     data, backups = tmp_path / "data", tmp_path / "backups"
     with running(Place(data), **scheduled(backups)):
         wait_for(backups, 1)
@@ -158,8 +151,7 @@ def nobody(*folders: Path) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("command", [["backup", "b.pgdump"], ["restore", "b.pgdump"], ["key", "sessions"]])
-def test_database_not_line(tmp_path: Path, command: list[str]) -> None:
-    """A database that is not there is one line."""
+def test_a_database_that_is_not_there_is_one_line(tmp_path: Path, command: list[str]) -> None:
     (tmp_path / "data").mkdir(0o700)
     (tmp_path / "b.pgdump").write_bytes(b"PGDMP")
     place = Place(tmp_path / "data", "postgresql://nobody@127.0.0.1:1/nowhere")

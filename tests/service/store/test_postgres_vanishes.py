@@ -14,11 +14,8 @@ from tests.support.store_server import Place, campaign, running
 NOTICED_S = 240  # by the system's own limits it would be a quarter of an hour
 
 
-def test_standby_writers_told_come(cluster: Cluster, tmp_path: Path) -> None:
-    """Of a standby writers are told to come again.
-
-    As after a failover, until it is promoted.
-    """
+def test_of_a_standby_writers_are_told_to_come_again(cluster: Cluster, tmp_path: Path) -> None:
+    """As after a failover, until it is promoted."""
     url = cluster.new_database()
     name = url.rpartition("/")[2]
 

@@ -32,8 +32,7 @@ def test_nothing_acknowledged_is_lost_on_sqlite(tmp_path: Path, part: int) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(PARTS))
-def test_nothing_acknowledged_lost_postgresql(tmp_path: Path, part: int) -> None:
-    """Nothing acknowledged is lost on postgresql."""
+def test_nothing_acknowledged_is_lost_on_postgresql(tmp_path: Path, part: int) -> None:
     if not postgres.available():
         pytest.skip("PostgreSQL (Debian's package postgresql) is not installed")
     folder = tmp_path / "server"

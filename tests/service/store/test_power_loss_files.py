@@ -91,8 +91,7 @@ def test_a_mechanism_is_kept(disk: Disk) -> None:
     assert [file.read_text() for file in own.glob("*.yaml")] == [WARM]
 
 
-def test_journal_watched_folder_said_kept(disk: Disk) -> None:
-    """What the journal of a watched folder has said is kept."""
+def test_what_the_journal_of_a_watched_folder_has_said_is_kept(disk: Disk) -> None:
     folder = disk.folder / "watched"
     moments = random.Random(3)
     for partly in (None, random.Random(1), random.Random(2)):

@@ -24,8 +24,7 @@ def metric(server: Server, name: str) -> float:
     return float(found[1])
 
 
-def test_backup_made_start_restored(place: Place, tmp_path: Path) -> None:
-    """A backup is made at the start and can be restored."""
+def test_a_backup_is_made_at_the_start_and_can_be_restored(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     with running(place, **NO_WORKERS) as server:
         first = sent(server, campaign("kept"))
@@ -46,8 +45,7 @@ def test_backup_made_start_restored(place: Place, tmp_path: Path) -> None:
         assert server.http.get(f"/v1/campaigns/{later}").status_code == 404
 
 
-def test_old_ones_deleted_files(place: Place, tmp_path: Path) -> None:
-    """Old ones are deleted and files of others are not."""
+def test_old_ones_are_deleted_and_files_of_others_are_not(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     folder.mkdir()
     names = ("notes.txt", "x.sqlite3", "20200101T000000Z.keep.sqlite3", "20209901T000000Z.sqlite3")
@@ -62,8 +60,7 @@ def test_old_ones_deleted_files(place: Place, tmp_path: Path) -> None:
     assert not list(folder.glob("*.part*"))
 
 
-def test_folder_disk_not_mounted_gets_no_place(place: Place, tmp_path: Path) -> None:
-    """A folder whose disk is not mounted any more gets no other in its place."""
+def test_a_folder_whose_disk_is_not_mounted_any_more_gets_no_other_in_its_place(place: Place, tmp_path: Path) -> None:
     folder, away = tmp_path / "backups", tmp_path / "away"
     log = place.folder.parent / f"{place.folder.name}.log"
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:
@@ -83,8 +80,7 @@ def test_folder_disk_not_mounted_gets_no_place(place: Place, tmp_path: Path) -> 
         wait_for(folder, before + 1)
 
 
-def test_backup_fails_counted_logged_made_later(place: Place, tmp_path: Path) -> None:
-    """A backup that fails is counted logged and made later."""
+def test_a_backup_that_fails_is_counted_logged_and_made_later(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "not-a-folder"
     folder.write_text("a file")
     log = place.folder.parent / f"{place.folder.name}.log"
@@ -96,8 +92,7 @@ def test_backup_fails_counted_logged_made_later(place: Place, tmp_path: Path) ->
         wait_for(folder, 1)
 
 
-def test_wrong_clock_dated_ahead_makes_none(place: Place, tmp_path: Path) -> None:
-    """What a wrong clock dated ahead makes none superfluous."""
+def test_what_a_wrong_clock_dated_ahead_makes_none_superfluous(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     folder.mkdir()
     ahead = folder / "underskin-20990101T000000Z.sqlite3"
@@ -110,8 +105,7 @@ def test_wrong_clock_dated_ahead_makes_none(place: Place, tmp_path: Path) -> Non
     assert "ahead" in found["backups"]["found"]
 
 
-def test_no_old_deleted_newest_far_smaller(tmp_path: Path) -> None:
-    """No old one is deleted while the newest is far smaller."""
+def test_no_old_one_is_deleted_while_the_newest_is_far_smaller(tmp_path: Path) -> None:
     folder, data = tmp_path / "backups", tmp_path / "data"
     folder.mkdir()
     data.mkdir()
@@ -124,8 +118,7 @@ def test_no_old_deleted_newest_far_smaller(tmp_path: Path) -> None:
 
 
 @pytest.mark.soak
-def test_store_busy_long_ends_no_schedule(tmp_path: Path) -> None:
-    """A store that is busy for long ends no schedule."""
+def test_a_store_that_is_busy_for_long_ends_no_schedule(tmp_path: Path) -> None:
     folder, data = tmp_path / "backups", tmp_path / "data"
     data.mkdir()
     with running(Place(data), **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)):
@@ -139,8 +132,7 @@ def test_store_busy_long_ends_no_schedule(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_two_servers_make_backup(place: Place, tmp_path: Path) -> None:
-    """Two servers make one backup between them."""
+def test_two_servers_make_one_backup_between_them(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     with running(place, **scheduled(folder)), running(place, **scheduled(folder)):
         wait_for(folder, 1)
@@ -148,8 +140,7 @@ def test_two_servers_make_backup(place: Place, tmp_path: Path) -> None:
         assert len(stored_backups(folder)) == 1
 
 
-def test_folder_store_left_alone_doctor_says(place: Place, tmp_path: Path) -> None:
-    """A folder of another store is left alone and the doctor says so."""
+def test_a_folder_of_another_store_is_left_alone_and_the_doctor_says_so(place: Place, tmp_path: Path) -> None:
     folder, other = tmp_path / "backups", Place(tmp_path / "other")
     other.folder.mkdir()
     with running(place, **scheduled(folder)):
@@ -168,8 +159,7 @@ def test_folder_store_left_alone_doctor_says(place: Place, tmp_path: Path) -> No
     assert own["backups"]["level"] == "ok"
 
 
-def test_store_restored_backup_before_schedule(tmp_path: Path) -> None:
-    """A store restored from a backup of before it had a schedule goes on with its own."""
+def test_a_store_restored_from_a_backup_of_before_it_had_a_schedule_goes_on_with_its_own(tmp_path: Path) -> None:
     folder, place, old = tmp_path / "backups", Place(tmp_path / "data"), tmp_path / "old.sqlite3"
     place.folder.mkdir()
     with running(place, **NO_WORKERS):

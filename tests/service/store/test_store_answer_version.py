@@ -33,8 +33,7 @@ KNOWN = {
 }
 
 
-def test_answer_earlier_version_computed_anew(server: Server) -> None:
-    """An answer of an earlier version is computed anew."""
+def test_an_answer_of_an_earlier_version_is_computed_anew(server: Server) -> None:
     campaign_id = server.http.post("/v1/campaigns?skin=palm", json=campaign("one")).json()["id"]
     answer = server.http.get(f"/v1/campaigns/{campaign_id}/d33").json()
     history = server.http.get("/v1/skins/palm/history").json()
@@ -53,8 +52,7 @@ def test_answer_earlier_version_computed_anew(server: Server) -> None:
     store.close()
 
 
-def test_figures_drawn_alike_kept_numbers(place: Place) -> None:
-    """Figures are drawn alike from kept numbers and from recordings."""
+def test_figures_are_drawn_alike_from_kept_numbers_and_from_recordings(place: Place) -> None:
     many = campaign("many", sensors=25, lines=5)
     del many["recordings"][7]["coherence"]  # a gap in what is kept
     seen = []
@@ -84,8 +82,7 @@ def _figures(page: str) -> list[str]:
     return re.findall(r'<script type="application/json">(.*?)</script>', page, re.DOTALL)
 
 
-def test_store_first_schema_kept_computed_anew(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a store of the first schema kept is computed anew."""
+def test_what_a_store_of_the_first_schema_kept_is_computed_anew(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     table = load_table()
     store = database(place.database_url, place.folder)
     with monkeypatch.context() as earlier:

@@ -142,8 +142,7 @@ def test_readers_answered_restore_goes(place: Place, tmp_path: Path, monkeypatch
         assert server.http.post("/v1/campaigns", json=campaign("after it")).status_code == 201
 
 
-def test_backup_sqlite_file_read(tmp_path: Path) -> None:
-    """A backup of sqlite is one file that is only read."""
+def test_a_backup_of_sqlite_is_one_file_that_is_only_read(tmp_path: Path) -> None:
     (tmp_path / "data").mkdir()
     store = open_store("", tmp_path / "data")
     file = tmp_path / "alone" / "kept"
@@ -158,8 +157,7 @@ def test_backup_sqlite_file_read(tmp_path: Path) -> None:
 
 
 @on_both
-def test_no_backup_refused_changes_nothing(server: Server, tmp_path: Path) -> None:
-    """What is no backup is refused and changes nothing."""
+def test_what_is_no_backup_is_refused_and_changes_nothing(server: Server, tmp_path: Path) -> None:
     send(server, "kept")
     good = tmp_path / "good"
     assert server.place.command("backup", str(good)).returncode == 0

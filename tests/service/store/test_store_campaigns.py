@@ -20,8 +20,7 @@ def listed(server: Server, **query: str | int) -> list[dict[str, Any]]:
     return list(answer.json()["campaigns"])
 
 
-def test_sent_comes_back_last_digit(server: Server) -> None:
-    """What was sent comes back to the last digit."""
+def test_what_was_sent_comes_back_to_the_last_digit(server: Server) -> None:
     sent = campaign("first")
     answer = post(server, sent, skin="palm")
     assert answer["skin_id"] == "palm"
@@ -31,8 +30,7 @@ def test_sent_comes_back_last_digit(server: Server) -> None:
     assert document == sent
 
 
-def test_bad_recordings_named_good_ones_kept(server: Server) -> None:
-    """Bad recordings are named and the good ones kept."""
+def test_bad_recordings_are_named_and_the_good_ones_kept(server: Server) -> None:
     document = campaign("mixed")
     document["recordings"][0]["preload_n"] = -1
     document["recordings"][1]["frf_re_pc_per_n"][3] = None
@@ -50,8 +48,7 @@ def test_bad_recordings_named_good_ones_kept(server: Server) -> None:
     assert {entry["id"] for entry in detail["refused"]} == set(refused)
 
 
-def test_nothing_keeps_nothing_spoilt_batch(server: Server) -> None:
-    """All or nothing keeps nothing of a spoilt batch."""
+def test_all_or_nothing_keeps_nothing_of_a_spoilt_batch(server: Server) -> None:
     spoilt = campaign("spoilt")
     spoilt["recordings"][4]["dynamic_force_n"] = 0
     answer = server.http.post("/v1/campaigns?all_or_nothing=true", json=[campaign("good"), spoilt])
@@ -60,8 +57,7 @@ def test_nothing_keeps_nothing_spoilt_batch(server: Server) -> None:
     assert listed(server, state="all") == []
 
 
-def test_form_many_files_answered_file_file(server: Server) -> None:
-    """A form of many files is answered file by file."""
+def test_a_form_of_many_files_is_answered_file_by_file(server: Server) -> None:
     import orjson
 
     files = [
@@ -82,8 +78,7 @@ def test_form_many_files_answered_file_file(server: Server) -> None:
     assert {entry["name"] for entry in listed(server)} == {"one", "three", "four"}
 
 
-def test_key_gets_answer_keeps_once(server: Server) -> None:
-    """The same key gets the same answer and keeps once."""
+def test_the_same_key_gets_the_same_answer_and_keeps_once(server: Server) -> None:
     headers = {"Idempotency-Key": "run-7"}
     first, second = (server.http.post("/v1/campaigns", json=campaign("run"), headers=headers) for _ in range(2))
     assert first.status_code == 201
@@ -95,9 +90,7 @@ def test_key_gets_answer_keeps_once(server: Server) -> None:
     assert len(listed(server, state="all")) == 1
 
 
-def test_key_many_times_once_keeps_once(server: Server) -> None:
-    """The same key many times at once keeps once."""
-
+def test_the_same_key_many_times_at_once_keeps_once(server: Server) -> None:
     def send(_: int) -> dict[str, Any]:
         answer = server.http.post("/v1/campaigns", json=campaign("at once"), headers={"Idempotency-Key": "k"})
         assert answer.status_code == 201, answer.text
@@ -109,8 +102,7 @@ def test_key_many_times_once_keeps_once(server: Server) -> None:
     assert len(listed(server, state="all")) == 1
 
 
-def test_refused_request_not_use_up_key(server: Server) -> None:
-    """A refused request does not use up its key."""
+def test_a_refused_request_does_not_use_up_its_key(server: Server) -> None:
     headers = {"Idempotency-Key": "again"}
     assert server.http.post("/v1/campaigns", json={"schema": "campaign/2"}, headers=headers).status_code == 422
     assert server.http.post("/v1/campaigns", json=campaign("again"), headers=headers).status_code == 201
@@ -139,8 +131,7 @@ def test_lists_are_paged_and_filtered(server: Server) -> None:
     assert server.http.get("/v1/campaigns?recorded_from=yesterday").status_code == 422
 
 
-def test_letters_beyond_ascii_found_either_case(server: Server) -> None:
-    """Letters beyond ascii are found in either case."""
+def test_letters_beyond_ascii_are_found_in_either_case(server: Server) -> None:
     post(server, campaign("Übung Eins"), skin="Äußere Haut")
     for text in ("Übung", "übung", "ÜBUNG EINS"):
         assert [entry["name"] for entry in listed(server, name_contains=text)] == ["Übung Eins"], text
@@ -162,8 +153,7 @@ def test_a_withdrawn_campaign_stays_and_says_why(server: Server) -> None:
     assert server.http.post(f"/v1/campaigns/{name}/withdraw", json={"reason": " "}).status_code == 422
 
 
-def test_correction_replaces_original_stays(server: Server) -> None:
-    """A correction replaces and the original stays."""
+def test_a_correction_replaces_and_the_original_stays(server: Server) -> None:
     original = post(server, campaign("thin"), skin="palm")["id"]
     right = campaign("thick", thickness_mm=2.6)
     corrected = post(server, right, corrects=original, reason="thickness was read wrong")
@@ -182,8 +172,7 @@ def test_correction_replaces_original_stays(server: Server) -> None:
     assert server.http.post("/v1/campaigns", json=right, params={"corrects": corrected["id"]}).status_code == 422
 
 
-def test_correction_stays_skin_whatever_file(server: Server) -> None:
-    """A correction stays on its skin whatever its file says."""
+def test_a_correction_stays_on_its_skin_whatever_its_file_says(server: Server) -> None:
     wrong = post(server, campaign("monday"), skin="palm")["id"]
     right = campaign("monday again", id="finger")
     corrected = post(server, right, corrects=wrong, reason="cable")
@@ -199,8 +188,7 @@ def test_correction_stays_skin_whatever_file(server: Server) -> None:
     assert (same["skin_id"], same["notes"]) == ("finger", [])
 
 
-def test_two_corrections_once_leave_current(server: Server) -> None:
-    """Two corrections at once leave one current."""
+def test_two_corrections_at_once_leave_one_current(server: Server) -> None:
     original = post(server, campaign("first"), skin="palm")["id"]
     query = {"corrects": original, "reason": "both noticed"}
 

@@ -43,8 +43,7 @@ def detail(server: Server, campaign_id: str) -> dict[str, Any]:
     return answer
 
 
-def test_withdrawal_undone_until_something(server: Server, lab: httpx.Client) -> None:
-    """A withdrawal is undone until something builds on it."""
+def test_a_withdrawal_is_undone_until_something_builds_on_it(server: Server, lab: httpx.Client) -> None:
     campaign_id = sent(server, "monday")
     place = f"/campaigns/{campaign_id}"
     before = server.http.get("/v1/skins/palm/history").json()["sensors"]
@@ -64,8 +63,7 @@ def test_withdrawal_undone_until_something(server: Server, lab: httpx.Client) ->
     assert undo(lab, place, "ch-nothing").status_code == 404
 
 
-def test_written_campaign_found_taken_back(server: Server, lab: httpx.Client) -> None:
-    """What is written to a campaign is found and taken back."""
+def test_what_is_written_to_a_campaign_is_found_and_taken_back(server: Server, lab: httpx.Client) -> None:
     campaign_id = sent(server, "wednesday")
     place = f"/campaigns/{campaign_id}"
     d33 = server.http.get(f"/v1/campaigns/{campaign_id}/d33").json()
@@ -85,8 +83,7 @@ def test_written_campaign_found_taken_back(server: Server, lab: httpx.Client) ->
     assert detail(server, campaign_id)["name"] == "wednesday"
 
 
-def test_skin_without_campaigns_use_put_away(server: Server, lab: httpx.Client) -> None:
-    """Only a skin without campaigns in use is put away."""
+def test_only_a_skin_without_campaigns_in_use_is_put_away(server: Server, lab: httpx.Client) -> None:
     campaign_id = sent(server, "trial", "trial")
     sent(server, "kept", "kept")
     assert change(lab, "/skins/trial", "discard", reason="a trial") == 409
@@ -104,8 +101,7 @@ def test_skin_without_campaigns_use_put_away(server: Server, lab: httpx.Client) 
     assert ">trial</a>" in lab.get("/").text
 
 
-def test_export_brings_changes_made(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
-    """An export brings changes and who made them."""
+def test_an_export_brings_changes_and_who_made_them(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
     campaign_id = sent(server, "moved")
     place = f"/campaigns/{campaign_id}"
     assert change(lab, place, "annotate", name="renamed", remark="as it was", tags="one, two") == 303

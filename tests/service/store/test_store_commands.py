@@ -57,8 +57,7 @@ def test_campaigns_and_skins_are_listed(server: Server) -> None:
     assert refused(server, "campaigns", "--skin", "plam") == "underskin: 404 Not Found: There is no skin 'plam'."
 
 
-def test_campaign_shown_recordings_diagnoses(server: Server) -> None:
-    """A campaign is shown with its recordings and diagnoses."""
+def test_a_campaign_is_shown_with_its_recordings_and_diagnoses(server: Server) -> None:
     spoilt = campaign("spoilt", sensors=2)
     spoilt["recordings"][0]["preload_n"] = -1.0
     campaign_id = server.http.post("/v1/campaigns?skin=palm", json=spoilt).json()["id"]
@@ -72,8 +71,7 @@ def test_campaign_shown_recordings_diagnoses(server: Server) -> None:
     assert document == server.http.get(f"/v1/campaigns/{campaign_id}").json()
 
 
-def test_campaign_withdrawn_recording_excluded(server: Server) -> None:
-    """A campaign is withdrawn and a recording excluded with the reason."""
+def test_a_campaign_is_withdrawn_and_a_recording_excluded_with_the_reason(server: Server) -> None:
     campaign_id = sent(server, "first", "palm")
     words = told(server, "exclude", campaign_id, "s0-1N", "--reason", "cable loose")
     assert words == f"recording s0-1N is excluded; 1 of 2 recordings are now, of campaign {campaign_id}\n"
@@ -87,8 +85,7 @@ def test_campaign_withdrawn_recording_excluded(server: Server) -> None:
     assert "--reason" in refused(server, "withdraw", campaign_id)
 
 
-def test_campaign_corrected_once_however_often(server: Server, tmp_path: Path) -> None:
-    """A campaign is corrected once however often it is sent."""
+def test_a_campaign_is_corrected_once_however_often_it_is_sent(server: Server, tmp_path: Path) -> None:
     first = sent(server, "first", "palm")
     file, other = tmp_path / "right.json", tmp_path / "other.json"
     file.write_bytes(orjson.dumps(campaign("right", sensors=1)))
@@ -116,8 +113,7 @@ def test_the_model_of_a_diagnosis_is_adopted(server: Server) -> None:
     assert refused(server, "adopt", "palm", "d-none").endswith("There is no diagnosis 'd-none'.")
 
 
-def test_key_missing_wrong_server_not_said(tmp_path: Path) -> None:
-    """A key that is missing or wrong and a server that is not there are said."""
+def test_a_key_that_is_missing_or_wrong_and_a_server_that_is_not_there_are_said(tmp_path: Path) -> None:
     place = Place(tmp_path / "data")
     place.folder.mkdir()
     keys = {

@@ -60,8 +60,7 @@ def consume(store: Database, row: AnyRow) -> None:
 
 @pytest.mark.slow
 @on("postgresql")
-def test_document_takes_memory_few_recordings(place: Place, tmp_path: Path) -> None:
-    """A document takes the memory of a few recordings."""
+def test_a_document_takes_the_memory_of_a_few_recordings(place: Place, tmp_path: Path) -> None:
     store = open_store(place.database_url, place.folder)
     sent = parse(large())
     with store.writing() as connection:
@@ -77,8 +76,7 @@ def test_document_takes_memory_few_recordings(place: Place, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("count", [1, 8, 9, 17])
-def test_documents_number_recordings_whole(server: Server, count: int) -> None:
-    """Documents of any number of recordings are whole."""
+def test_documents_of_any_number_of_recordings_are_whole(server: Server, count: int) -> None:
     document = {**campaign("many", sensors=9, lines=3, id="palm"), "units_checked": True}
     document["recordings"] = document["recordings"][:count]
     document["recordings"][0] |= {"position_mm": [0.1, 0.2], "load_cycles": 3}

@@ -82,8 +82,7 @@ def test_a_skin_is_elsewhere_as_it_was_here(server: Server, elsewhere: Server) -
     assert sent(server, file).json() == {"skin_id": "palm", "kept": 0, "present": 6}
 
 
-def test_differs_here_refuses_whole_file(server: Server, elsewhere: Server) -> None:
-    """What differs here refuses the whole file."""
+def test_what_differs_here_refuses_the_whole_file(server: Server, elsewhere: Server) -> None:
     fill(server)
     sent(elsewhere, exported(server))
     current = elsewhere.http.get("/v1/campaigns?skin=palm").json()["campaigns"][0]["id"]
@@ -95,8 +94,7 @@ def test_differs_here_refuses_whole_file(server: Server, elsewhere: Server) -> N
     assert state(elsewhere) == before
 
 
-def test_skin_joined_through_elsewhere_here(server: Server, elsewhere: Server) -> None:
-    """A skin joined through another is elsewhere as it was here."""
+def test_a_skin_joined_through_another_is_elsewhere_as_it_was_here(server: Server, elsewhere: Server) -> None:
     for name in ("a", "b", "c"):  # by id, those that refer come first
         assert server.http.post("/v1/campaigns", json=campaign(name), params={"skin": name}).status_code == 201
     for skin, other in (("b", "a"), ("c", "b")):
@@ -109,8 +107,7 @@ def test_skin_joined_through_elsewhere_here(server: Server, elsewhere: Server) -
         assert elsewhere.http.get("/v1/skins/a").json() == server.http.get("/v1/skins/a").json()
 
 
-def test_file_many_times_once_kept_once(server: Server, elsewhere: Server) -> None:
-    """The same file many times at once is kept once."""
+def test_the_same_file_many_times_at_once_is_kept_once(server: Server, elsewhere: Server) -> None:
     server.http.post("/v1/campaigns?skin=palm", json=[campaign("one"), campaign("two")])
     file = server.http.get("/v1/skins/palm/export").content
     with ThreadPoolExecutor(3) as pool:
@@ -205,11 +202,8 @@ def whole(servers: Callable[[str], Server]) -> bytes:
     return server.http.get("/v1/skins/palm/export").content
 
 
-def test_file_tampered_nothing_kept(whole: bytes, elsewhere: Server, tmp_path: Path) -> None:
-    """Of a file that was tampered with nothing is kept.
-
-    Nor of what is no export.
-    """
+def test_of_a_file_that_was_tampered_with_nothing_is_kept(whole: bytes, elsewhere: Server, tmp_path: Path) -> None:
+    """Nor of what is no export."""
     file = tmp_path / "palm.h5"
     refused = {"empty": b"", "not HDF5": b"not HDF5", "a head alone": b"\x89HDF\r\n\x1a\n" + bytes(500)}
     for name, spoil in first(5, SPOILT.items()):

@@ -49,8 +49,7 @@ def cramped(request: pytest.FixtureRequest, small_disk: Path, tmp_path: Path) ->
     cluster.drop(url)
 
 
-def test_full_disk_refuses_keeps_acknowledged(cramped: Place, small_disk: Path) -> None:
-    """A full disk refuses and keeps what it acknowledged."""
+def test_a_full_disk_refuses_and_keeps_what_it_acknowledged(cramped: Place, small_disk: Path) -> None:
     acknowledged: dict[str, dict[str, Any]] = {}
     with running(cramped) as server:
         statuses: list[int] = []
@@ -74,8 +73,7 @@ def test_full_disk_refuses_keeps_acknowledged(cramped: Place, small_disk: Path) 
         require_kept(server, acknowledged)
 
 
-def test_upload_not_fit_refused_streams(small_disk: Path) -> None:
-    """An upload that does not fit is refused as it streams."""
+def test_an_upload_that_does_not_fit_is_refused_as_it_streams(small_disk: Path) -> None:
     with running(Place(small_disk)) as server:
         document = orjson.dumps(campaign("one")) + b" " * 10_000_000
         answer = server.http.post("/v1/campaigns", files={"file": ("big.json", document)})

@@ -12,8 +12,7 @@ from tests.support.store_server import Server
 
 
 @pytest.mark.parametrize("server", ["postgresql"], indirect=True)
-def test_answered_example_waits_store(server: Server) -> None:
-    """Others are answered while the example waits for the store."""
+def test_others_are_answered_while_the_example_waits_for_the_store(server: Server) -> None:
     with (
         httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=300) as browser,
         psycopg.connect(server.place.database_url) as locking,

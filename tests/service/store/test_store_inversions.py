@@ -38,8 +38,7 @@ def derive(store: Database, row: AnyRow) -> None:
         inversions.keep(connection, row, TABLE, {"campaign_id": row.id}, {}, {"s0": (14.0, 0.1)})
 
 
-def test_history_shows_nothing_earlier_revision(store: Database) -> None:
-    """A history shows nothing of an earlier revision."""
+def test_a_history_shows_nothing_of_an_earlier_revision(store: Database) -> None:
     row = kept(store, "one")
     derive(store, row)
     with store.reading() as connection:
@@ -51,11 +50,9 @@ def test_history_shows_nothing_earlier_revision(store: Database) -> None:
 
 
 @pytest.mark.parametrize("error", [OverflowError("too large"), ValueError("no zone"), IndexError("none left")])
-def test_figures_cannot_computed_answer_tried(
+def test_figures_that_cannot_be_computed_are_an_answer_and_tried_again(
     store: Database, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, error: Exception
 ) -> None:
-    """Figures that cannot be computed are an answer and tried again."""
-
     def fail(*_: object) -> None:
         raise error
 
@@ -72,8 +69,7 @@ def test_figures_cannot_computed_answer_tried(
         assert len(inversions.history(connection, "palm", table.sha256)) == 3
 
 
-def test_derived_before_restore_not_kept(store: Database, tmp_path: Path) -> None:
-    """What was derived before a restore is not kept for another campaign."""
+def test_what_was_derived_before_a_restore_is_not_kept_for_another_campaign(store: Database, tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     backup.make(store, empty)
     lost = kept(store, "lost")

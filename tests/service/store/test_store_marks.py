@@ -6,9 +6,7 @@ from tests.support.store_server import Server, campaign
 BACKEND = "sqlite"
 
 
-def test_mark_changes_page_shows_nothing_else(server: Server) -> None:
-    """A mark changes with what the page shows and with nothing else."""
-
+def test_a_mark_changes_with_what_the_page_shows_and_with_nothing_else(server: Server) -> None:
     def mark(skin: str) -> str:
         return str(server.http.get(f"/skins/{skin}/mark").json()["mark"])
 

@@ -49,8 +49,7 @@ def a_later_version(monkeypatch: pytest.MonkeyPatch, folder: Path, spoil: str = 
     monkeypatch.setattr(migrate, "VERSIONS", (*migrate.VERSIONS, "next"))
 
 
-def test_migrations_make_tables_code_uses(store: Database) -> None:
-    """The migrations make the tables that the code uses."""
+def test_the_migrations_make_the_tables_that_the_code_uses(store: Database) -> None:
     from alembic.autogenerate import compare_metadata
     from alembic.migration import MigrationContext
     from alembic.script import ScriptDirectory
@@ -61,10 +60,9 @@ def test_migrations_make_tables_code_uses(store: Database) -> None:
     assert ScriptDirectory(str(migrate.SCRIPTS)).get_current_head() == migrate.VERSIONS[-1]
 
 
-def test_older_store_backed_up_brought_up_date(
+def test_an_older_store_is_backed_up_and_brought_up_to_date(
     store: Database, place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An older store is backed up and brought up to date."""
     a_later_version(monkeypatch, tmp_path)
     migrate.migrate(store, place.folder)
     with store.reading() as connection:
@@ -84,10 +82,9 @@ def test_without_a_backup_there_is_no_migration(
     assert migrate.version(store) == NEWEST
 
 
-def test_migration_fails_leaves_store(
+def test_a_migration_that_fails_leaves_the_store_as_it_was(
     store: Database, place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A migration that fails leaves the store as it was."""
     a_later_version(monkeypatch, tmp_path, spoil="raise RuntimeError('halfway')")
     with pytest.raises(RuntimeError, match="halfway"):
         migrate.migrate(store, place.folder)

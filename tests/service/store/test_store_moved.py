@@ -78,8 +78,7 @@ def assert_kept(server: Server) -> None:
         assert names(later) == before
 
 
-def test_removed_file_still_saved(server: Server, tmp_path: Path) -> None:
-    """What was in a removed file can still be saved."""
+def test_what_was_in_a_removed_file_can_still_be_saved(server: Server, tmp_path: Path) -> None:
     skin = server.http.get("/v1/campaigns").json()["campaigns"][0]["skin_id"]
     (server.place.folder / DATABASE).unlink()
     assert names(server) == {"one", "two"}
@@ -98,8 +97,7 @@ def test_removed_file_still_saved(server: Server, tmp_path: Path) -> None:
         assert len(names(other)) == 1
 
 
-def test_write_ahead_log_lost_database(server: Server, tmp_path: Path) -> None:
-    """A write ahead log that lost its database is not overwritten."""
+def test_a_write_ahead_log_that_lost_its_database_is_not_overwritten(server: Server, tmp_path: Path) -> None:
     assert server.place.command("backup", str(tmp_path / "kept")).returncode == 0
     log = server.place.folder / f"{DATABASE}-wal"
     server.kill()
@@ -117,11 +115,8 @@ def test_write_ahead_log_lost_database(server: Server, tmp_path: Path) -> None:
         assert_open(later, "three")
 
 
-def test_files_removed_put_back_used(server: Server, tmp_path: Path) -> None:
-    """Files that are removed and put back are used again.
-
-    What is sent meanwhile is not acknowledged, also where it was before.
-    """
+def test_files_that_are_removed_and_put_back_are_used_again(server: Server, tmp_path: Path) -> None:
+    """What is sent meanwhile is not acknowledged, also where it was before."""
     key = {"Idempotency-Key": "monday"}
     assert send(server, "again", **key) == send(server, "again", **key) == 201
     for file in (DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm"):
@@ -134,8 +129,7 @@ def test_files_removed_put_back_used(server: Server, tmp_path: Path) -> None:
     assert_kept(server)
 
 
-def test_copy_place_file_folder_not_written(server: Server, tmp_path: Path) -> None:
-    """A copy in the place of a file or folder is not written."""
+def test_a_copy_in_the_place_of_a_file_or_folder_is_not_written(server: Server, tmp_path: Path) -> None:
     folder = server.place.folder
     for file in (DATABASE, f"{DATABASE}-wal"):
         there = folder / file
@@ -174,8 +168,7 @@ def test_a_data_folder_is_moved_away_and_back(server: Server, tmp_path: Path) ->
     assert_kept(server)
 
 
-def test_backup_restored_file_removed_used(server: Server, tmp_path: Path) -> None:
-    """A backup restored where the file was removed is used after a restart."""
+def test_a_backup_restored_where_the_file_was_removed_is_used_after_a_restart(server: Server, tmp_path: Path) -> None:
     assert server.place.command("backup", str(tmp_path / "kept")).returncode == 0
     for file in server.place.folder.glob(f"{DATABASE}*"):
         file.unlink()
@@ -188,8 +181,7 @@ def test_backup_restored_file_removed_used(server: Server, tmp_path: Path) -> No
         assert_open(later, "three")
 
 
-def test_acknowledged_file_comes_goes(server: Server, tmp_path: Path) -> None:
-    """What is acknowledged while the file comes and goes is there."""
+def test_what_is_acknowledged_while_the_file_comes_and_goes_is_there(server: Server, tmp_path: Path) -> None:
     acknowledged: set[str] = set()
     refused: list[int] = []
     ending = threading.Event()
@@ -230,8 +222,7 @@ def test_acknowledged_file_comes_goes(server: Server, tmp_path: Path) -> None:
     assert acknowledged <= kept
 
 
-def test_diagnoses_wait_file_log_says_once(place: Place, tmp_path: Path) -> None:
-    """Diagnoses wait for the file and the log says so once."""
+def test_diagnoses_wait_for_the_file_and_the_log_says_so_once(place: Place, tmp_path: Path) -> None:
     log = place.folder.parent / f"{place.folder.name}.log"
     watchers = ("no diagnosis can be claimed", "which sessions were ended cannot", "whether keys are needed cannot")
     with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:

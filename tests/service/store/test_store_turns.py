@@ -56,8 +56,7 @@ def test_readers_are_answered_while_writers_wait(server: Server) -> None:
     assert max(answers) < 500
 
 
-def test_files_read_uploads_wait_writers(server: Server) -> None:
-    """Files are read while uploads wait for other writers."""
+def test_files_are_read_while_uploads_wait_for_other_writers(server: Server) -> None:
     book = io.BytesIO()
     save_workbook(book)
     url = str(server.http.base_url)
@@ -75,8 +74,7 @@ def test_files_read_uploads_wait_writers(server: Server) -> None:
         assert [one.result() for one in waiting] == [201] * 4
 
 
-def test_nothing_long_begins_wait_write_vain(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing long begins while others wait to write in vain."""
+def test_nothing_long_begins_while_others_wait_to_write_in_vain(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(write_turns, "WAIT_S", 0.3)
     monkeypatch.setattr("service.store.engine.WAIT_S", 0.3)
     with closing(store_of(place)) as store:
@@ -105,11 +103,8 @@ def save_workbook(file: io.BytesIO) -> None:
 
 
 @pytest.mark.parametrize("place", BACKENDS, indirect=True)
-def test_many_wait_vain_told(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of many that wait in vain each is told so.
-
-    More than a pool has connections.
-    """
+def test_of_many_that_wait_in_vain_each_is_told_so(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    """More than a pool has connections."""
     monkeypatch.setattr(write_turns, "WAIT_S", 0.6)
     monkeypatch.setattr("service.store.engine.WAIT_S", 0.6)
     monkeypatch.setattr("service.store.engine.CONNECTION_WAIT_S", 0.3)
@@ -130,8 +125,7 @@ def test_many_wait_vain_told(place: Place, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.parametrize("place", BACKENDS, indirect=True)
-def test_reader_without_connection_told(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A reader without a connection is told so."""
+def test_a_reader_without_a_connection_is_told_so(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("service.store.engine.CONNECTION_WAIT_S", 0.3)
     with closing(store_of(place)) as store, ExitStack() as stack:
         for _ in range(15):  # all that its pool may have
@@ -141,8 +135,7 @@ def test_reader_without_connection_told(place: Place, monkeypatch: pytest.Monkey
 
 
 @pytest.mark.parametrize("place", BACKENDS, indirect=True)
-def test_readers_hold_connections_keep_no_writer(place: Place) -> None:
-    """Readers that hold all connections keep no writer waiting."""
+def test_readers_that_hold_all_connections_keep_no_writer_waiting(place: Place) -> None:
     with closing(store_of(place)) as store, ExitStack() as stack:
         for _ in range(15):
             stack.enter_context(store.reading())

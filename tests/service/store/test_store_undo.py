@@ -68,8 +68,7 @@ def listed(store: Database) -> set[str]:
     return {row.id for row in store.read(skins.listed, None, None, 9)}
 
 
-def test_join_below_undone(store: Database) -> None:
-    """A join below another is undone only after that."""
+def test_a_join_below_another_is_undone_only_after_that(store: Database) -> None:
     for name in "abcd":
         store.write(skins.require, name)
     lower, upper = joined(store, "a", "b"), joined(store, "c", "a")
@@ -84,8 +83,7 @@ def test_join_below_undone(store: Database) -> None:
     assert roots(store, "abcd") == {"a": "a", "b": "d", "c": "c", "d": "d"}
 
 
-def test_join_undone_since_exported_imported(store: Database, tmp_path: Path) -> None:
-    """A join undone since is exported and imported."""
+def test_a_join_undone_since_is_exported_and_imported(store: Database, tmp_path: Path) -> None:
     for name in "ab":
         store.write(skins.require, name)
     store.write(undo.undo, joined(store, "a", "b"), None)
@@ -96,8 +94,7 @@ def test_join_undone_since_exported_imported(store: Database, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("away", ["palm", "hand"])
-def test_neither_two_joined_skins_stays_put_away(store: Database, away: str) -> None:
-    """Neither of two joined skins stays put away."""
+def test_neither_of_two_joined_skins_stays_put_away(store: Database, away: str) -> None:
     for name in ("palm", "hand"):
         store.write(skins.require, name)
     store.write(annotations.discard, away, "empty", None)
@@ -109,8 +106,7 @@ def test_neither_two_joined_skins_stays_put_away(store: Database, away: str) -> 
     assert listed(store) == {"palm", "hand"}
 
 
-def test_arrivals_skin_not_wait(on_postgresql: Database) -> None:
-    """Arrivals of one skin do not wait for each other."""
+def test_arrivals_of_one_skin_do_not_wait_for_each_other(on_postgresql: Database) -> None:
     on_postgresql.write(skins.require, "palm")
     with on_postgresql.writing() as connection:
         keep(connection, "palm")
@@ -120,8 +116,7 @@ def test_arrivals_skin_not_wait(on_postgresql: Database) -> None:
         assert not other.is_alive()
 
 
-def test_arrival_brings_back_skin_being_put_away(on_postgresql: Database) -> None:
-    """An arrival brings back a skin that is being put away."""
+def test_an_arrival_brings_back_a_skin_that_is_being_put_away(on_postgresql: Database) -> None:
     on_postgresql.write(skins.require, "palm")
     other = threading.Thread(target=on_postgresql.write, args=(keep, "palm"))
     with on_postgresql.writing() as connection:
@@ -133,8 +128,7 @@ def test_arrival_brings_back_skin_being_put_away(on_postgresql: Database) -> Non
     assert listed(on_postgresql) == {"palm"}
 
 
-def test_undo_change_campaign_wait(on_postgresql: Database) -> None:
-    """An undo and a change of one campaign wait for each other."""
+def test_an_undo_and_a_change_of_one_campaign_wait_for_each_other(on_postgresql: Database) -> None:
     campaign_id = on_postgresql.write(keep, "palm")
     on_postgresql.write(annotations.of_campaign, campaign_id, {"remark": "wet"}, None)
     other = threading.Thread(target=on_postgresql.write, args=(undo.undo, last(on_postgresql), None))
@@ -148,8 +142,7 @@ def test_undo_change_campaign_wait(on_postgresql: Database) -> None:
     assert on_postgresql.read(campaigns.find, campaign_id).remark is None
 
 
-def test_undo_correction_waits_model_skin_left(on_postgresql: Database) -> None:
-    """The undo of a correction waits for a model of the skin that it left."""
+def test_the_undo_of_a_correction_waits_for_a_model_of_the_skin_that_it_left(on_postgresql: Database) -> None:
     older, another = on_postgresql.write(keep, "palm"), on_postgresql.write(keep, "palm")
     asked = on_postgresql.write(diagnoses.ask, another, diagnoses.Basis("0" * 64, "1.0"), None)
     diagnosis = on_postgresql.read(diagnoses.find, asked.id)

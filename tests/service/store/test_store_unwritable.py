@@ -43,8 +43,7 @@ def kept_d33(place: Place) -> int:
         return int(connection.execute(select(func.count()).select_from(inversions)).scalar_one())
 
 
-def test_d33_not_kept_told_during_restore(server: Server) -> None:
-    """D33 that is not kept is told during a restore."""
+def test_d33_that_is_not_kept_is_told_during_a_restore(server: Server) -> None:
     arrivals = [server.http.post("/v1/campaigns?skin=palm", json=campaign(f"run {n}")) for n in range(CAMPAIGNS)]
     paths = [f"/v1/campaigns/{arrivals[0].json()['id']}/d33", "/v1/skins/palm/history", "/skins/palm/history.csv"]
     before = {path: answered(server, path).text for path in paths}
@@ -70,8 +69,7 @@ def read_only(folder: Path) -> Iterator[None]:
         subprocess.run(["umount", "--lazy", folder], check=True)
 
 
-def test_disk_read_refuses_kept_told(tmp_path: Path) -> None:
-    """A disk that is read only refuses and what is kept is told."""
+def test_a_disk_that_is_read_only_refuses_and_what_is_kept_is_told(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     folder.mkdir()
     with running(Place(folder)) as server:

@@ -26,8 +26,7 @@ def places(cluster: Cluster, tmp_path: Path) -> list[Place]:
     return [Place(folder, url) for folder in folders]
 
 
-def test_either_acknowledged_kept_killed(places: list[Place]) -> None:
-    """What either acknowledged is kept when one is killed."""
+def test_what_either_acknowledged_is_kept_when_one_is_killed(places: list[Place]) -> None:
     streams = [Stream(number) for number in range(2)]
     with ExitStack() as stack:
         servers = [stack.enter_context(running(place, **_NONE)) for place in places]
@@ -49,8 +48,7 @@ def test_either_acknowledged_kept_killed(places: list[Place]) -> None:
 
 
 @pytest.mark.soak
-def test_diagnosis_killed_server_taken(places: list[Place]) -> None:
-    """A diagnosis of a killed server is taken over."""
+def test_a_diagnosis_of_a_killed_server_is_taken_over(places: list[Place]) -> None:
     with running(places[0], **_ONE) as first:
         diagnosis_id = begun(first, small())
         awaited(first, diagnosis_id, "running")

@@ -49,8 +49,7 @@ def made(mechanisms: dict[str, tuple[float, ...]], names: dict[str, tuple[str, .
     return {**report(), "mechanisms": found}
 
 
-def test_adopted_model_physics_found(server: Server, client: Client) -> None:
-    """An adopted model is the physics that was found."""
+def test_an_adopted_model_is_the_physics_that_was_found(server: Server, client: Client) -> None:
     campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
     with pytest.raises(ServiceError, match="no adopted model"):
         client.skins.model("palm")
@@ -134,8 +133,7 @@ def test_another_skin_is_not_the_model_s(server: Server, client: Client) -> None
     assert np.isnan(beyond.frf_pc_per_n).tolist() == [False, True]
 
 
-def test_histories_say_model_value_used(server: Server, client: Client) -> None:
-    """Histories say which model each value used."""
+def test_histories_say_which_model_each_value_used(server: Server, client: Client) -> None:
     campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
     other = sent(server, campaign("of another skin, by its modulus"))
     model_id = client.skins.adopt("palm", diagnosis_id)["id"]
@@ -188,8 +186,7 @@ def test_what_cannot_be_adopted_is_refused(server: Server, client: Client) -> No
         client.skins.adopt("palm", diagnosis_id)
 
 
-def test_model_campaign_changed_serves_no_longer(server: Server, client: Client) -> None:
-    """A model whose campaign was changed serves no longer."""
+def test_a_model_whose_campaign_was_changed_serves_no_longer(server: Server, client: Client) -> None:
     campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
     client.skins.adopt("palm", diagnosis_id)
     client.campaigns.withdraw(campaign_id, "fell down")
@@ -256,8 +253,7 @@ def _spoil(report: dict[str, Any], part: str) -> dict[str, Any]:
     return spoilt
 
 
-def test_report_tampered_refused(server: Server, elsewhere: Server, tmp_path: Path) -> None:
-    """A report that was tampered with is refused."""
+def test_a_report_that_was_tampered_with_is_refused(server: Server, elsewhere: Server, tmp_path: Path) -> None:
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     with Client(str(server.http.base_url)) as here, Client(str(elsewhere.http.base_url)) as there:
         here.skins.adopt("palm", diagnosis_id)

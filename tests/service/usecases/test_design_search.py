@@ -55,8 +55,7 @@ def least_dip(offset: Floats, response: Floats, pitch: float, distance: float) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("resolution_mm", first(2, [1.2, 6.0, 2.0]))
-def test_every_design_offered_meets_demand(resolution_mm: float) -> None:
-    """Every design that is offered meets the demand by the forward calculation."""
+def test_every_design_that_is_offered_meets_the_demand_by_the_forward_calculation(resolution_mm: float) -> None:
     answer = found(resolution_mm=resolution_mm)
     assert answer.offers
     assert not answer.binding
@@ -77,11 +76,8 @@ def test_every_design_offered_meets_demand(resolution_mm: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("changed", first(2, [{}, {"preload_n": 0.05}, {"resolution_mm": 5.0}]))
-def test_every_pair_counted_meets_demand_pitch(changed: dict[str, float]) -> None:
-    """Every pair that is counted meets the demand at its pitch.
-
-    Also near the edge, where few placements of the row take for resolved what the full calculation does not.
-    """
+def test_every_pair_that_is_counted_meets_the_demand_at_its_pitch(changed: dict[str, float]) -> None:
+    """Also near the edge, where few placements of the row take for resolved what the full calculation does not."""
     answer, region = found(**changed), found(**changed).region
     pairs = list(zip(*np.nonzero(answer.feasible), strict=True))[:: 1 if SOAK else 3]
     asked = {name: value for name, value in {**ASKED, **changed}.items() if name in DesignRequest.model_fields}
@@ -127,8 +123,7 @@ def test_limit_keeps_out_named_number(field: str, asked: float, words: str) -> N
     assert not found(**{field: 1.03 * float(told[1])}).feasible.any()
 
 
-def test_two_contacts_touch_limit_every_skin() -> None:
-    """Two contacts that touch are the limit of every skin."""
+def test_two_contacts_that_touch_are_the_limit_of_every_skin() -> None:
     touching = 2 * float(found().region.contact_radius_mm.min())
     assert touching < 2e3 * (3 * 1.0 * 4e-3 * 0.75 / (4 * 16e6)) ** (1 / 3)  # Hertz, ν = 1/2: a thin layer is stiffer
     answer = found(resolution_mm=0.99 * touching)
@@ -137,8 +132,7 @@ def test_two_contacts_touch_limit_every_skin() -> None:
     assert not answer.feasible.any()
 
 
-def test_force_beyond_table_told_highest() -> None:
-    """A force beyond the table is told with the highest one."""
+def test_a_force_beyond_the_table_is_told_with_the_highest_one() -> None:
     answer = found(preload_n=100.0, resolution_mm=10.0)
     assert answer.binding[0].startswith("The table of σ")
     highest = float(answer.binding[0].split("at most ")[1].removesuffix(" N"))
@@ -146,8 +140,7 @@ def test_force_beyond_table_told_highest() -> None:
     assert not np.isfinite(found(preload_n=1.01 * highest, resolution_mm=10.0).region.frf_pc_per_n).any()
 
 
-def test_largest_pitch_bell_sensor_sensor_dip() -> None:
-    """The largest pitch of a bell is where sensor by sensor the dip is just seen."""
+def test_the_largest_pitch_of_a_bell_is_where_sensor_by_sensor_the_dip_is_just_seen() -> None:
     spread, distance = 0.4e-3, 2.4e-3
     offset = np.linspace(0, 12 * spread, 600)
     bell = np.exp(-((offset / spread) ** 2) / 2)

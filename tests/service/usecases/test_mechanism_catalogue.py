@@ -38,11 +38,8 @@ def test_file_removed_catalogue_read_not_shown(tmp_path: Path, monkeypatch: pyte
         mechanisms.catalogue()  # as it was for other tests
 
 
-def test_restored_store_holds_under_numbers_read(server: Server) -> None:
-    """What a restored store holds under the same numbers is read.
-
-    Another diagnosis may have the number of one that was looked at before.
-    """
+def test_what_a_restored_store_holds_under_the_same_numbers_is_read(server: Server) -> None:
+    """Another diagnosis may have the number of one that was looked at before."""
     store = database(server.place.database_url, server.place.folder)
     try:
         for mechanism in ("contact_resonance", "modulus_error"):

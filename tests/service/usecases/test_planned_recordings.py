@@ -46,8 +46,7 @@ def sent(server: Server, rig: dict[str, Any], number: int) -> str:
     return str(answer.json()["campaigns"][0]["id"])
 
 
-def test_rows_ticked_off_recordings_arrive(lab: tuple[Server, Database, str, str]) -> None:
-    """Rows are ticked off as their recordings arrive."""
+def test_rows_are_ticked_off_as_their_recordings_arrive(lab: tuple[Server, Database, str, str]) -> None:
     server, store, campaign_id, diagnosis_id = lab
     assert arrived(store, diagnosis_id) == [0, 0]  # those that were diagnosed do not count
     with store.reading() as connection:
@@ -73,8 +72,7 @@ def test_rows_ticked_off_recordings_arrive(lab: tuple[Server, Database, str, str
     assert kept["recordings"][0]["preload_n"] == 1.5
 
 
-def test_rig_curves_not_tell_how_frfs_read(lab: tuple[Server, Database, str, str]) -> None:
-    """A rig of curves does not tell how frfs are read."""
+def test_a_rig_of_curves_does_not_tell_how_frfs_are_read(lab: tuple[Server, Database, str, str]) -> None:
     server, store, campaign_id, _ = lab
     of_curves = {
         "schema": "rig/1",

@@ -40,8 +40,7 @@ def test_skins_are_paged_and_found(server: Server) -> None:
     assert server.http.get("/v1/skins/none").status_code == 404
 
 
-def test_joined_skins_keep_names(server: Server) -> None:
-    """Joined skins are one and keep their names."""
+def test_joined_skins_are_one_and_keep_their_names(server: Server) -> None:
     a, b, c = (post(server, skin, skin, year=year) for skin, year in (("a", 2017), ("b", 2018), ("c", 2019)))
     join = {"skin_id": "b", "reason": "the label fell off"}
     assert server.http.post("/v1/skins/a/join", json=join).status_code == 200
@@ -71,8 +70,7 @@ def test_a_joined_skin_is_not_joined_again(server: Server) -> None:
     assert (answer.status_code, "'a'" in answer.json()["detail"]) == (409, True)
 
 
-def test_sensor_ages_shows(server: Server) -> None:
-    """A sensor that ages shows and the others do not."""
+def test_a_sensor_that_ages_shows_and_the_others_do_not(server: Server) -> None:
     for year in range(2017, 2023):
         document = campaign(f"{year}")
         for recording in document["recordings"]:
@@ -101,8 +99,7 @@ def test_sensor_ages_shows(server: Server) -> None:
         (("2017-05-03T09:00:00", "2017-05-03T12:00:00", "2017-05-04T08:59:00"), "less than a day"),
     ],
 )
-def test_no_trend_told_times_tell_none(server: Server, times: tuple[str | None, ...], why: str) -> None:
-    """No trend is told from times that tell none."""
+def test_no_trend_is_told_from_times_that_tell_none(server: Server, times: tuple[str | None, ...], why: str) -> None:
     for number, time in enumerate(times):
         document = campaign(f"{number}")
         for recording in document["recordings"]:
@@ -140,11 +137,8 @@ def test_figures_say_what_they_leave_out(server: Server) -> None:
     assert absent.status_code == 404
 
 
-def test_array_ages_told_before_sensors(server: Server) -> None:
-    """An array that ages is told before its sensors.
-
-    All sensors fall by 3 % from date to date, which no sensor alone tells; the page and the command say it.
-    """
+def test_an_array_that_ages_is_told_before_its_sensors(server: Server) -> None:
+    """All sensors fall by 3 % from date to date, which no sensor alone tells; the page and the command say it."""
     for number in range(4):
         document = campaign(f"{number}", sensors=6)
         for recording in document["recordings"]:

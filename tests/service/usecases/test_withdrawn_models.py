@@ -44,8 +44,7 @@ def point_ids(client: Client) -> set[str]:
     return {point["model_id"] for entry in history["sensors"] for point in entry["points"]}
 
 
-def test_without_skin_answers_never_model(server: Server, client: Client) -> None:
-    """Without it the skin answers as one that never had a model."""
+def test_without_it_the_skin_answers_as_one_that_never_had_a_model(server: Server, client: Client) -> None:
     campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
     never = by_the_adopted_model(server, campaign_id)
     assert {status for status, _ in never} == {404}
@@ -106,10 +105,9 @@ def test_it_is_withdrawn_once(server: Server, client: Client) -> None:
     assert client.skins.model("palm") == newest
 
 
-def test_files_older_underskin_come_spoilt_ones(
+def test_files_of_an_older_underskin_come_in_and_spoilt_ones_do_not(
     server: Server, elsewhere: Server, client: Client, tmp_path: Path
 ) -> None:
-    """Files of an older underskin come in and spoilt ones do not."""
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     adopted = client.skins.adopt("palm", diagnosis_id)
     file = tmp_path / "palm.h5"
