@@ -90,4 +90,4 @@ def _requested(sent: Mapping[str, str]) -> AskForFleet:
     chosen = _chosen(sent)
     if len(chosen) < FEWEST_SKINS:
         raise too_few("skins", f"{len(chosen)} chosen", f"must be {FEWEST_SKINS} at least: tick those of one make")
-    return parsed(AskForFleet, {"skins": chosen, "name": sent.get("name", "").strip()})
+    return parsed(AskForFleet, {"skins": list(chosen), "name": sent.get("name", "").strip()})

@@ -9,11 +9,11 @@ import pytest
 from sqlalchemy import insert, select, text, update
 
 from service.schemas.campaign_d33 import ANSWER_VERSION, D33
-from service.store import campaigns, database, migrate, open_store, skins
+from service.store import campaigns, database, open_store
 from service.store.codec import compressed, decompressed
 from service.store.tables import inversions, sensor_d33
-from service.store.times import now
 from service.usecases import d33_cache
+from tests.service.store.old_stores.contents import take_over
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import load_table
 from underskin.inversion.invert import invert
@@ -82,22 +82,16 @@ def _figures(page: str) -> list[str]:
     return re.findall(r'<script type="application/json">(.*?)</script>', page, re.DOTALL)
 
 
-def test_what_a_store_of_the_first_schema_kept_is_computed_anew(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_store_of_the_first_schema_kept_is_computed_anew(place: Place) -> None:
     table = load_table()
+    take_over(place, "0001")
     store = database(place.database_url, place.folder)
-    with monkeypatch.context() as earlier:
-        earlier.setattr(migrate, "VERSIONS", ("0001",))
-        migrate.migrate(store, place.folder)
-    with store.writing() as connection, monkeypatch.context() as earlier:
-        earlier.setattr(campaigns, "keep_digests", lambda *_: None)  # a table of a later schema
-        earlier.setattr(skins, "require", lambda *_: "palm")  # columns of a later schema
-        connection.execute(
-            text("INSERT INTO skins (id, root_id, created_at) VALUES ('palm', 'palm', :at)"), {"at": now()}
-        )
-        campaign_id, _ = campaigns.add(connection, campaigns.NewCampaign(parse(campaign("one")), "palm"))
-        number = connection.execute(text("SELECT number FROM campaigns")).scalar_one()
-        old = "INSERT INTO inversions (campaign, revision, table_sha256, document) VALUES (:campaign, 0, :table, :old)"
-        kept = {"campaign": number, "table": table.sha256, "old": compressed({"d33": 99})}
+    with store.writing() as connection:
+        number, campaign_id, revision = connection.execute(text("SELECT number, id, revision FROM campaigns")).all()[0]
+        connection.execute(text("DELETE FROM inversions"))
+        connection.execute(text("DELETE FROM sensor_d33"))
+        old = "INSERT INTO inversions (campaign, revision, table_sha256, document) VALUES (:number, :at, :table, :old)"
+        kept = {"number": number, "at": revision, "table": table.sha256, "old": compressed({"d33": 99})}
         connection.execute(text(old), kept)
         point = {"sensor": "s0", "d33_pc_per_n": 99.0, "d33_uncertainty_pc_per_n": 1.0}
         connection.execute(insert(sensor_d33), {"campaign": number, **point})

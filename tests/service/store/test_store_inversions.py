@@ -12,7 +12,6 @@ from service.store.tables import AnyRow
 from service.usecases import d33_cache
 from tests.support.store_server import Place, campaign
 from underskin import load_table
-from underskin.inversion import invert
 from underskin.recordings.campaign import parse
 
 BACKEND = "sqlite"
@@ -58,7 +57,7 @@ def test_figures_that_cannot_be_computed_are_an_answer_and_tried_again(
 
     row, table = kept(store, "odd"), load_table()
     with monkeypatch.context() as broken:
-        broken.setattr(invert, "invert", fail)
+        broken.setattr(d33_cache, "invert", fail)
         for band in (None, (10.0, 100.0)):
             told = D33(**d33_cache.answer(store, table, row, band))
             assert (told.status, str(error) in str(told.reason), told.sensors) == ("none", True, [])
