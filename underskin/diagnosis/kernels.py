@@ -1,6 +1,6 @@
 """Compiled sums over rows: the likelihood of the roughness of lines, products of dynamic factors with their
-derivatives, corrections of sums for mains pick-up, and the likelihood, sums of curves and priors of a fit (see
-`inference.hypothesis` for the model of the noise).
+derivatives, corrections of sums for mains pick-up, the evidence of laws with several amplitudes, and the likelihood,
+sums of curves and priors of a fit (see `inference.hypothesis` for the model of the noise).
 
 A row of variance κ² d² has κ² d² + q² with pick-up: its weight 1/d² in the sums (over κ²) becomes
 1/d² · 1/(1 + x), x = (q/κ)²/d², and log|C| grows by 2 log(1 + x). Arrays of a fit are (points, sets, recordings); one
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.compiled import compiled
-from underskin.units import Array, Complexes, Floats, Mask
+from underskin.units import Array, Complexes, Floats, Indices, Mask
 
 _VARIANCES_TOGETHER = 4  # factors, of 1e-70 to 1e70 each, that share one logarithm
 
@@ -160,6 +160,71 @@ def subtract_pickup(
         _subtract_losses(losses, uu, uy, yy, point, current_recording)
         for number in range(sets):
             log_determinant[point, number] += 2 * (total[number] + np.log(factors[number]))
+
+
+@compiled("void(float64[:, :, ::1], float64[:, ::1], float64[::1])")
+def law_gains(grams: Floats, moments: Floats, gains: Floats) -> None:
+    """ln p(y) with a law less that without, ½ (mᵀ (I + G)⁻¹ m − ln |I + G|), by Cholesky's factors.
+
+    Parameters
+    ----------
+    grams
+        G (sets, features, features), AᵀC⁻¹A of the features A.
+    moments
+        m (sets, features), AᵀC⁻¹r of the residual r.
+    gains
+        (sets,), to be filled.
+    """
+    size = moments.shape[1]
+    lower, solved = np.empty((size, size)), np.empty(size)
+    for number in range(len(moments)):
+        determinant = square = 0.0
+        for i in range(size):
+            for j in range(i):
+                total = grams[number, i, j]
+                for k in range(j):
+                    total -= lower[i, k] * lower[j, k]
+                lower[i, j] = total / lower[j, j]
+            total, right = 1 + grams[number, i, i], moments[number, i]
+            for k in range(i):
+                total -= lower[i, k] ** 2
+                right -= lower[i, k] * solved[k]
+            lower[i, i] = np.sqrt(total)
+            solved[i] = right / lower[i, i]
+            determinant += np.log(total)
+            square += solved[i] ** 2
+        gains[number] = 0.5 * (square - determinant)
+
+
+@compiled("void(float64[:, ::1], int64[::1], int64[::1], float64[:, ::1], float64[:, :, :, ::1])")
+def less_shared(weights: Floats, rows: Indices, first: Indices, columns: Floats, grams: Floats) -> None:
+    """Subtract Σ sₙ sₙᵀ from products of columns, sₙ = Σ w x over the n-th sensor's recordings.
+
+    Parameters
+    ----------
+    weights
+        w at each scatter (scatters, pairs), the pairs of a sensor contiguous.
+    rows, first
+        The row of `columns` of each pair, and the first pair of each sensor (sensors + 1,).
+    columns
+        x (rows, sets · features).
+    grams
+        (sets, scatters, features, features), to be changed.
+    """
+    count, size = grams.shape[0], grams.shape[2]
+    width = count * size
+    sums = np.empty(width)
+    for scatter in range(len(weights)):
+        for sensor in range(len(first) - 1):
+            sums[:] = 0.0
+            for pair in range(first[sensor], first[sensor + 1]):
+                weight, row = weights[scatter, pair], rows[pair]
+                for column in range(width):
+                    sums[column] += weight * columns[row, column]
+            for number in range(count):
+                for i in range(size):
+                    for j in range(size):
+                        grams[number, scatter, i, j] -= sums[number * size + i] * sums[number * size + j]
 
 
 _NONE = 1e-300  # u*u where u is 0

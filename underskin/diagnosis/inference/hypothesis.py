@@ -103,6 +103,7 @@ class Tangent:
         self._log_gains = sensor_log_gain[:, None, lines.sensor]
         self._k2, p2 = levels.level**2, levels.position**2
         self._sums = sums = products.summed(levels)
+        self._curvature = curvature
         self._factor = factor = np.exp(self._log_gains + 0.5 * p2 * curvature.laplacian)
         self._a = a = products.level[:, None] * factor
         self._mean = a * (1 - self._log_gains)
@@ -122,19 +123,20 @@ class Tangent:
         """The most probable b of each sensor (points, sensors)."""
         return np.asarray(self._sensor_gains[:, 0])
 
-    @property
-    def projections(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Re u*u, Re u*m and Re u*r (recordings,), and Re u*J (P, recordings), of the first point's recordings: m the
-        mean, r the residual, J the derivatives by the parameters."""
-        slopes = self._slope_projections / self._k2
-        return self._uu[0, 0], (self._a * self._uu)[0, 0], self._ur[0, 0], slopes[0]
+    def projections(self, position: float) -> tuple[Floats, Floats, Floats]:
+        """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter [m],
+        with weights 1/d² (without κ)."""
+        log_gain, level = self._log_gains[0, 0], self._products.level[0]
+        uu, uy = (np.broadcast_to(of[0, 0], level.shape) for of in (self._sums.uu, self._sums.uy))
+        a = level * np.exp(log_gain + 0.5 * position**2 * self._curvature.laplacian)
+        return a * uu, uy - a * (1 - log_gain) * uu, uu
 
     @cached_property
     def _slope_sums(self) -> SlopeSums | None:
         return self._products.slope_sums(self._levels)
 
     @property
-    def _slope_projections(self) -> Floats:
+    def slope_projections(self) -> Floats:
         """Re u*J (points, P, recordings) of the derivatives by the parameters, with weights 1/d² (without κ)."""
         by_level, sums = self._products.level_slopes, self._slope_sums
         along = 0.0 if by_level is None else by_level * self._factor * self._sums.uu
@@ -176,7 +178,7 @@ class Tangent:
         if by_level is not None and sums is not None:
             mixed = leveled @ (self._a * sums.uv).swapaxes(1, 2)
             square = square + mixed + mixed.swapaxes(1, 2)
-        return self.information(self._slope_projections, square), gradient[..., 0]
+        return self.information(self.slope_projections, square), gradient[..., 0]
 
     @property
     def _gradients(self) -> list[Floats]:

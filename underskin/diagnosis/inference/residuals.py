@@ -17,7 +17,6 @@ from typing import Self
 import numpy as np
 
 from underskin.diagnosis.inference.evidence import (
-    Evidence,
     level_integrals,
     marginalise_sensor_spread,
     mean_integrals,
@@ -28,10 +27,9 @@ from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, Points, cell_response
 from underskin.errors import InvalidInput
 from underskin.halton import halton
-from underskin.inversion.mixed_model import GAIN_RANGE
 from underskin.mechanisms.base import Normal, Unsupported
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.mechanisms.models.frf import FAINT, FrfModel
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.physics.charge_response import INCOMPRESSIBLE, Indenter
 from underskin.prediction.pressed_skin import declared_skin, log_slopes
 from underskin.recordings.campaign import Tolerances, frf_of
@@ -104,58 +102,6 @@ class Reading:
     def of_parts(self) -> Floats:
         """The variance of real and of imaginary part (2, rows)."""
         return np.asarray(self.variance + self.relative * np.array([self.value.real, self.value.imag]) ** 2)
-
-
-@dataclass(frozen=True, eq=False)
-class LevelResiduals:
-    """The relative residual r of each recording's level, its prior of the parameters and of the sensors' gains
-    marginalised: C = V + F Fᵀ, V the `variance` by the fit's noise, F the change by one prior deviation of each.
-
-    Attributes: C⁻¹ = V⁻¹ − Tᵀ T with the `projector` T (columns, recordings), `weighted` C⁻¹ r (recordings,), and the
-    `least` V of a careful rig over that of the fit.
-    """
-
-    residual: Floats
-    variance: Floats
-    projector: Floats
-    weighted: Floats
-    least: float
-
-    @classmethod
-    def of(cls, best: Evidence) -> Self:
-        """Of a fit to FRFs."""
-        square, size, along, by_parameters = best.tangent.projections
-        size = np.where(np.abs(size) > FAINT * np.abs(size).max(), size, FAINT * np.abs(size).max())
-        slopes = (by_parameters / size).T
-        centre = np.array([parameter.start for parameter in best.hypothesis.model.parameters]) - best.point.fit
-        residual = along / size - slopes @ centre
-        scatter = best.position_variance(best.levels.position) + square / size**2
-        variance = best.levels.gain**2 + scatter
-        least = min(float(np.median((GAIN_RANGE[0] ** 2 + scatter) / variance)), 1.0)
-        deviations = best.hypothesis.prior_precision**-0.5
-        columns = np.hstack([slopes * deviations, best.levels.spread * best.hypothesis.lines.sensors])
-        weighed = columns.T / variance
-        lower = np.linalg.cholesky(weighed @ columns + np.eye(columns.shape[1]))
-        projector = np.asarray(np.linalg.solve(lower, weighed), dtype=float)
-        weighted = residual / variance - (projector @ residual) @ projector
-        return cls(residual, variance, projector, weighted, least)
-
-    @property
-    def chi2(self) -> float:
-        """rᵀ C⁻¹ r."""
-        return float(self.residual @ self.weighted)
-
-    @property
-    def freedom(self) -> float:
-        """The number of recordings, less what parameters and sensors' gains take up of it."""
-        return float(len(self.residual) - (self.variance * (self.projector**2).sum(axis=0)).sum())
-
-    def products(self, changes: Floats) -> tuple[Floats, Floats]:
-        """XᵀC⁻¹X (sets, features, features) and XᵀC⁻¹r (sets, features) of sets of relative changes X of the levels
-        (sets, recordings, features)."""
-        rows = changes.swapaxes(1, 2)
-        taken_up = self.projector @ changes
-        return (rows / self.variance) @ changes - taken_up.swapaxes(1, 2) @ taken_up, rows @ self.weighted
 
 
 def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:

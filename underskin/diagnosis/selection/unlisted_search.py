@@ -2,7 +2,7 @@
 
 A score test estimates what each of several hundred laws would gain in evidence on top of an explanation. The residual
 of the explanation is projected onto the change that a law would make, on a small grid of its shape parameters: linear
-algebra under the noise, no fit. Laws over whole recordings are tested on their levels (`LevelResiduals`), laws along
+algebra under the noise, no fit. Laws over whole recordings are tested on their gains (`gain_residual`), laws along
 frequency on the deviations of lines from their recording's best real multiple (`Residuals`), laws of indentation
 curves on samples, together with the explanation's parameters.
 
@@ -23,12 +23,12 @@ from underskin.diagnosis.inference.evidence import NEGLIGIBLE_NATS
 from underskin.diagnosis.inference.explanation import PRUNE_NATS, Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.residuals import (
     MAY_MATTER_NATS,
-    LevelResiduals,
     Linearised,
     Residuals,
     force_and_slopes,
 )
 from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.gain_residual import GainResidual
 from underskin.mechanisms.base import Normal, Parameter
 from underskin.mechanisms.models.curve_state import Samples
 from underskin.mechanisms.models.curves import CurveModel, times_of
@@ -131,20 +131,13 @@ class Screening:
         return [*self._along_recordings(explanation), *along_lines]
 
     def _along_recordings(self, explanation: Explanation) -> Iterator[Score]:
-        of_fits = [(prior + fit.log_evidence, LevelResiduals.of(fit)) for prior, fit in explanation.fits]
+        residual = GainResidual(self._problem, explanation)
         for group in self._of_recordings:
             features = np.concatenate([self._features_of(law) for law in group.laws])
             columns = self._sensitivity[group.laws[0].description.acts_on].T
             changes = np.concatenate([features * column[:, None] for column in columns], axis=2)
             changes *= group.scale[:, None]
-            parts = [
-                (weight, _Noise(residuals.chi2, residuals.freedom, residuals.least).gains(*residuals.products(changes)))
-                for weight, residuals in of_fits
-            ]
-            log_densities = np.array([weight + gains for weight, (gains, _) in parts])
-            best = log_densities.argmax(axis=0)
-            amplitudes = np.array([of_fit for _, (_, of_fit) in parts])[best, np.arange(len(best))]
-            yield from group.scores(np.logaddexp.reduce(log_densities) - explanation.log_evidence, amplitudes)
+            yield from group.scores(residual.gains(changes), residual.amplitudes(changes))
 
     def _along_lines(self, explanation: Explanation) -> Iterator[Score]:
         weights, moments, noise = self._moments(explanation)
@@ -190,7 +183,7 @@ class Screening:
             self._features[key] = np.stack(features, axis=2)
         return self._features[key]
 
-    def _moments(self, explanation: Explanation) -> tuple[Floats, Array, "_Noise"]:
+    def _moments(self, explanation: Explanation) -> tuple[Floats, Array, "_LineNoise"]:
         """Weights and weighted residuals of lines (recordings, distinct frequencies), and their χ²."""
         lines = self._problem.lines
         residuals = Residuals.of(self._problem, explanation)
@@ -202,7 +195,7 @@ class Screening:
             for values in (weight, weight * relative.real, weight * relative.imag)
         )
         chi2 = float((weight * np.abs(relative) ** 2).sum())
-        return weights, real + 1j * imag, _Noise(chi2, 2 * len(relative) - lines.recordings)
+        return weights, real + 1j * imag, _LineNoise(chi2, 2 * len(relative) - lines.recordings)
 
 
 def grid_values(parameters: Sequence[Parameter], grid: Floats) -> dict[str, Differentiated]:
@@ -221,24 +214,22 @@ def prior_deviations(law: UnlistedLaw) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Noise:
-    """χ² of what is tested and its degrees of freedom: its noise, over that of the fit, is the most probable one and at
-    least the `least`; that of the fit where none is given."""
+class _LineNoise:
+    """χ² of the lines and its degrees of freedom; the noise level is the most probable one, at least 1."""
 
-    chi2: float = 0.0
-    freedom: float = 1.0
-    least: float = 1.0
+    chi2: float
+    freedom: int
 
     def gains(self, gram: Floats, moment: Floats) -> tuple[Floats, Floats]:
         """Log of p with amplitudes of prior sd 1 over p without (points,), and the most probable amplitudes."""
         eye = np.eye(gram.shape[-1])
-        initial_level = max(self.least, self.chi2 / max(self.freedom, 1.0))
+        initial_level = max(1.0, self.chi2 / max(self.freedom, 1))
         log_density_without = -0.5 * self.chi2 / initial_level - 0.5 * self.freedom * np.log(initial_level)
         level = np.full(len(gram), 1.0)
         for _ in range(4):
             solved = np.linalg.solve(gram + level[:, None, None] * eye, moment[..., None])[..., 0]
             remainder = self.chi2 - np.maximum((solved * moment).sum(axis=1), 0.0)
-            level = np.maximum(self.least, remainder / max(self.freedom, 1.0))
+            level = np.maximum(1.0, remainder / max(self.freedom, 1))
         determinant = np.linalg.slogdet(eye + gram / level[:, None, None])[1]
         log_density_with = -0.5 * remainder / level - 0.5 * self.freedom * np.log(level) - 0.5 * determinant
         return np.asarray(log_density_with - log_density_without), np.asarray(solved)
@@ -297,7 +288,10 @@ class CurveScreening:
             points, count = change.shape[:2]
             rows = first + np.arange(points * count).reshape(points, count)
             first += points * count
-            gains, amplitudes = _Noise().gains(marginal[rows[:, :, None], rows[:, None, :]], marginal[rows, -1])
+            gram = marginal[rows[:, :, None], rows[:, None, :]] + np.eye(count)
+            moment = marginal[rows, -1]
+            amplitudes = np.linalg.solve(gram, moment[..., None])[..., 0]
+            gains = 0.5 * (amplitudes * moment).sum(axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
             best = int(np.argmax(gains))
             mean = float(np.logaddexp.reduce(gains) - np.log(points))
             near_best = [index for index in range(points) if index != best and gains[index] > gains[best] - PRUNE_NATS]
