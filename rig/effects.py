@@ -114,9 +114,6 @@ EFFECTS: dict[str, Effect] = {
     "liquid_drag": Effect(
         "a liquid drags on the moving sphere, c dz/dt", (INDENTATION,), {"coefficient_n_s_per_mm": (0, 1e3)}
     ),
-    "stage_friction": Effect(
-        "the guide rubs with a constant force against the motion", (INDENTATION,), {"force_n": (0, 1e3)}
-    ),
     "platen_friction": Effect(
         "friction f at the ends of the cylinder: stiffer by 1 + 2 f S², S = diameter/(4 height)",
         (COMPRESSION,),

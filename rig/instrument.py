@@ -14,8 +14,6 @@ from rig.effects import Values
 from rig.experiment import Experiment
 from rig.layer import Floats
 
-_AT_ONCE = 1e-6  # slip [mm] over which a friction reverses that does so at once
-
 
 @dataclass(frozen=True)
 class Reading:
@@ -87,9 +85,6 @@ def _distorted(on: Mapping[str, Values], time: Floats, displacement: Floats, for
     if "liquid_drag" in on:
         speed = np.gradient(displacement, time)
         measured_force = measured_force + value("liquid_drag", "coefficient_n_s_per_mm") * speed
-    if "stage_friction" in on:
-        sense = _presliding(displacement, _AT_ONCE)
-        measured_force = measured_force + value("stage_friction", "force_n") * sense
     return moved, measured_force + value("force_drift", "n_per_root_s") * np.sqrt(time)
 
 

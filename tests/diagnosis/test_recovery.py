@@ -87,7 +87,6 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
     ("indentation", "liquid_drag"): Hidden(
         {"coefficient_n_s_per_mm": 0.2}, {"drag_coefficient": "coefficient_n_s_per_mm"}
     ),
-    ("indentation", "stage_friction"): Hidden({"force_n": 0.05}, {"friction_force": "force_n"}),
     ("indentation", "modulus_error"): Hidden({"factor": 1.5}, {"modulus_factor": "factor"}),
     ("compression", "strain_stiffening"): Hidden({"coefficient": 3.0}),  # in another parametrisation
     ("compression", "contact_creep"): Hidden(

@@ -179,27 +179,7 @@ def thinned(
             first, last = np.searchsorted(starts, np.array(event), side="right") - 1
             near = slice(max(min(first, last - 1), 0), last + 1)
             deviation[near] = np.hypot(deviation[near], float(np.ptp(means[1][near])))
-    if kind == "indentation":
-        deepest = int(means[0].argmax())
-        stays = means[0][deepest:] > means[0][deepest] - max(_MOVED * float(np.ptp(means[0])), _SURE_STEP * unsteady)
-        turns = slice(deepest + int(stays.argmin()) - 1, deepest + int(stays.argmin()) + 1)
-        if deepest and not stays.all():
-            deviation[turns] = np.hypot(deviation[turns], _leap(means[0], means[1], deviation, turns.start))
     return means, deviation, position, counts.astype(float)
-
-
-def _leap(displacement: Floats, force: Floats, deviation: Floats, turn: int) -> float:
-    """By how much the force leaps between the blocks before and after the two at which the way back begins, this drawn
-    straight on to where it began, beyond noise and curvature: friction or drag, of which the two may hold some of both
-    ways; 0 without a leap."""
-    before, after = turn - 1, turn + 2
-    if before < 0 or after > len(force) - 2:
-        return 0.0
-    rises, goes = (float(column[after] - column[after + 1]) for column in (force, displacement))
-    drawn_on = rises * float(displacement[before] - displacement[after]) / goes if goes else 0.0
-    leap = abs(float(force[after] + drawn_on - force[before]))
-    noise = float(np.linalg.norm(deviation[[before, after]])) * (1 + abs(drawn_on / rises) if rises else 1.0)
-    return leap if leap > _SURE_STEP * noise + _CURVES * abs(drawn_on) else 0.0
 
 
 def _slopes(displacement: Floats, force: Floats, noise: Floats, unloading: Mask) -> Floats:
@@ -539,8 +519,6 @@ _LEAST_SAMPLES = 5
 _ABSCISSA_RANGE = (1.0, 10.0)  # the abscissa: displacement over a curve's range, on this scale
 _IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
 _SURE_STEP = 4.0  # standard deviations
-_MOVED = 1e-3  # of the range of displacement: a sphere less far from its deepest point is held there
-_CURVES = 0.1  # of a change of force by a straight line, which a curve may miss
 _AIR_BLOCKS, _AIR_SAMPLES = 10, 4  # blocks of samples in the air, and samples of each at least
 _FAR_SHARE = 0.6  # of the samples in the air: nearer ones may be in contact
 _PLAINLY = 4.0  # times the variance that is expected: probability 1/4,000 by chance, of χ² with 7 degrees of freedom

@@ -10,7 +10,6 @@ from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage,
 from underskin.mechanisms.laws.contact_creep import time_runs_with_displacement
 from underskin.mechanisms.models.curve_state import Curve, SampleLaw, numbers, speeds
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
-from underskin.units import Floats
 
 _REASON = (
     "Stokes' 6πηR of the sphere in water and of a cantilever twenty times as wide: 4e-6 N·s/m under a tip of 10 µm; "
@@ -18,7 +17,6 @@ _REASON = (
 )
 _OF_RADIUS, _USUAL_RADIUS_MM = 4e-7, 0.01  # N·s/mm for each mm
 _SD = 2.5
-FRICTION_OF_RADIUS = 5.6e-4  # N for each mm², of a friction
 _ENDS, _SMALL = 20, 0.02  # one in so many samples at either end; of the force, the drag of a guess
 _AS_FAST = 0.5  # of the usual speed: slower, or as much faster, is another speed
 
@@ -58,15 +56,11 @@ class LiquidDrag(Mechanism):
     def parameters(
         self, conditions: Conditions, kind: Kind = "indentation", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
-        """The coefficient, expected for the spheres of the recordings; at one speed, where a friction of the guide is
-        the same, and so is its damping, as that friction."""
-        curves = _indentations(conditions)
-        if not curves:
+        """The coefficient, expected for the spheres of the recordings."""
+        radii = [curve.indenter_radius_mm for curve in _indentations(conditions)]
+        if not radii:
             return self.parameters_stated
-        expected = _OF_RADIUS * _median_radius(curves)
-        if is_at_one_speed(curves):
-            expected = usual_friction(curves) / float(np.median(np.abs(_speeds(curves))))
-        usual = Normal(math.log(expected), _SD)
+        usual = Normal(math.log(_OF_RADIUS * float(np.median(radii))), _SD)
         return tuple(replace(parameter, prior=usual) for parameter in self.parameters_stated)
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
@@ -110,39 +104,28 @@ def meaning(values: Mapping[str, float], conditions: Conditions) -> str:
     curves = _indentations(conditions)
     if not is_at_one_speed(curves):
         return ""
-    times = values["drag_coefficient"] / (_OF_RADIUS * _median_radius(curves))
+    times = values["drag_coefficient"] / (_OF_RADIUS * float(np.median([curve.indenter_radius_mm for curve in curves])))
     return (
         "At one speed a friction of the guide, constant against the motion, reads the same, and this is "
         f"{times:.1g} times the drag of water on the sphere: press at a second speed to tell them apart."
     )
 
 
-def usual_friction(curves: Sequence[IndentationConditions]) -> float:
-    """The friction of a guide that is expected with the spheres of the recordings [N]."""
-    return FRICTION_OF_RADIUS * _median_radius(curves) ** 2
+def usual_coefficient(conditions: Conditions) -> float:
+    """The coefficient that is expected for the spheres of the recordings [N·s/mm]."""
+    return _OF_RADIUS * float(np.median([curve.indenter_radius_mm for curve in _indentations(conditions)]))
 
 
 def is_at_one_speed(curves: Sequence[IndentationConditions]) -> bool:
     """Whether each way of all curves is at one speed, without a hold: a drag and a constant friction then differ by a
-    zero of the force at most. False of curves without times."""
-    if any(curve.time_s is None for curve in curves):
-        return False
-    speed = _speeds(curves)
-    other = int(np.sum(speed == 0))
+    zero of the force at most."""
+    timed = [(curve.displacement_mm, curve.time_s) for curve in curves if curve.time_s is not None]
+    speed = np.concatenate([speeds(travel[None], time[None])[0] for travel, time in timed])
+    shares = []
     for way in (speed[speed > 0], -speed[speed < 0]):
         usual = float(np.median(way)) if len(way) else 0.0
-        other += int(np.sum((way < _AS_FAST * usual) | (_AS_FAST * way > usual)))
-    return other <= len(speed) / _ENDS
-
-
-def _speeds(curves: Sequence[IndentationConditions]) -> Floats:
-    """The speeds of the samples of all curves with times [mm/s]."""
-    timed = [(curve.displacement_mm, curve.time_s) for curve in curves if curve.time_s is not None]
-    return np.concatenate([speeds(travel[None], time[None])[0] for travel, time in timed])
-
-
-def _median_radius(curves: Sequence[IndentationConditions]) -> float:
-    return float(np.median([curve.indenter_radius_mm for curve in curves]))
+        shares.append(float(np.sum((way < _AS_FAST * usual) | (_AS_FAST * way > usual))))
+    return sum(shares) + float(np.sum(speed == 0)) <= len(speed) / _ENDS
 
 
 def _indentations(conditions: Conditions) -> list[IndentationConditions]:

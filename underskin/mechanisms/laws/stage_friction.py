@@ -7,22 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.mechanisms.base import Kind, Mechanism, Normal, Parameter, Stage, Values
-from underskin.mechanisms.laws.liquid_drag import FRICTION_OF_RADIUS, usual_friction
-from underskin.mechanisms.models.curve_state import Curve, SampleLaw, numbers
+from underskin.mechanisms.laws.liquid_drag import is_at_one_speed, usual_coefficient
+from underskin.mechanisms.models.curve_state import Curve, SampleLaw, numbers, speeds
 from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
 from underskin.recordings.curve_course import RETURN
 from underskin.units import Floats
 
 _REASON = (
-    "a hundredth of Hertz's force on 1 MPa at a tenth of the radius, 0.056 N for each mm² of R², within a factor of "
-    "12: guides roll or rub, and samples are softer or harder"
+    "a hundredth of Hertz's force on 1 MPa at a tenth of the radius, 0.056 N for each mm² of R², within a factor of 12: "
+    "guides roll or rub, and samples are softer or harder"
 )
-_USUAL_RADIUS_MM = 5.0
+_OF_RADIUS_SQUARED, _USUAL_RADIUS_MM = 5.6e-4, 5.0  # N for each mm²
 _SD = 2.5
 _ENDS, _SMALL = 20, 0.02  # one in so many samples at either end; of the force, the friction of a guess
 _AT_ONCE = 2  # samples from motion to motion the other way, without a hold
-_EVENLY = 3.0  # times that by which it slows before: a longer stand is a hold
-_FAST = 0.75  # quantile of the speeds while it moves or creeps in a hold: the usual one
 _MOVES = 0.05  # of the usual speed: below it the stage stands, and its friction stays as it was
 
 
@@ -31,7 +29,8 @@ class StageFriction(Mechanism):
 
     name = "stage_friction"
     plain = """A guide between sphere and load cell rubs with a constant force against the motion, so the force is
-    higher on the way in than on the way back, alike at every depth and speed and in the air, and stays so in a hold."""
+    higher on the way in than on the way back, by as much at every depth and in the air, however fast it moves; it stays
+    through a hold, and changes sides where the motion turns."""
     law = "measured force = contact force + F_f · sign of the last motion of the displacement."
     assumptions = """Coulomb's friction, with one size for all recordings, independent of the load and of the speed, and
     without the travel over which a guide starts to slip after a turn. A drag is proportional to the speed instead: it
@@ -49,7 +48,7 @@ class StageFriction(Mechanism):
             "N",
             1e-13,
             1e3,
-            Normal(math.log(FRICTION_OF_RADIUS * _USUAL_RADIUS_MM**2), _SD),
+            Normal(math.log(_OF_RADIUS_SQUARED * _USUAL_RADIUS_MM**2), _SD),
             "log",
             limit=0.0,
             shown=0.02,
@@ -60,11 +59,15 @@ class StageFriction(Mechanism):
     def parameters(
         self, conditions: Conditions, kind: Kind = "indentation", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
-        """The friction, expected for the spheres of the recordings."""
+        """The friction, expected for the spheres of the recordings; at one speed, at which it cannot be told from a drag,
+        as probable as that."""
         curves = _indentations(conditions)
         if not curves:
             return self.parameters_stated
-        usual = Normal(math.log(usual_friction(curves)), _SD)
+        expected = _OF_RADIUS_SQUARED * float(np.median([curve.indenter_radius_mm for curve in curves])) ** 2
+        if any(curve.time_s is not None for curve in curves) and is_at_one_speed(curves):
+            expected = usual_coefficient(conditions) * _usual_speed(curves)
+        usual = Normal(math.log(expected), _SD)
         return tuple(replace(parameter, prior=usual) for parameter in self.parameters_stated)
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
@@ -110,10 +113,8 @@ def direction(speed: Floats) -> Floats:
 
 
 def _direction_of(speed: Floats) -> Floats:
-    size = np.abs(speed)
-    usual = float(np.quantile(size[size > 0], _FAST)) if size.any() else 0.0  # shorter curves end in samples that stand
-    samples, least = np.arange(len(speed)), _MOVES * usual
-    moves = size > least
+    samples = np.arange(len(speed))
+    moves = np.abs(speed) > _MOVES * np.median(np.abs(speed))
     last = np.maximum.accumulate(np.where(moves, samples, -1))
     sign = np.sign(speed[np.where(last < 0, moves.argmax(), last)])
     result = sign.copy()
@@ -121,16 +122,22 @@ def _direction_of(speed: Floats) -> Floats:
     for before, after in zip(moving[:-1].tolist(), moving[1:].tolist(), strict=True):
         if sign[before] == sign[after]:
             continue
-        slows = abs(float(speed[max(before - 2, 0)] - speed[before])) / 2  # from sample to sample
-        if after - before <= _AT_ONCE or (after - before) * slows < _EVENLY * 2 * least:
+        if after - before <= _AT_ONCE:
             for at in range(max(before, 1), min(after + 1, len(speed) - 1)):
-                change = float(speed[at - 1] - speed[at + 1]) * sign[before]
-                result[at] = np.clip(4 * speed[at] / change, -1.0, 1.0) if change > 0 else result[at]
+                change = speed[at - 1] - speed[at + 1]
+                if change * sign[before] > 0:
+                    result[at] = np.clip(4 * speed[at] / abs(change), -1.0, 1.0)
             continue
         back = abs(float(speed[min(after + 3, len(speed) - 1)]))
         for at in range(after, min(after + 2, len(speed))):
             result[at] = sign[before] * np.clip(2 - 4 * abs(float(speed[at])) / max(back, 1e-300), -1.0, 1.0)
     return np.asarray(result)
+
+
+def _usual_speed(curves: Sequence[IndentationConditions]) -> float:
+    """The median speed [mm/s] of recordings with times."""
+    timed = [(curve.displacement_mm, curve.time_s) for curve in curves if curve.time_s is not None]
+    return float(np.median(np.abs(np.concatenate([speeds(travel[None], time[None])[0] for travel, time in timed]))))
 
 
 def _turns(displacement: Floats) -> bool:
