@@ -102,30 +102,17 @@ class LiquidDrag(Mechanism):
 def meaning(values: Mapping[str, float], conditions: Conditions) -> str:
     """What else reads like the drag where the sphere moves at one speed: a friction of the guide, which is constant."""
     curves = _indentations(conditions)
-    if not is_at_one_speed(curves):
+    timed = [(curve.displacement_mm, curve.time_s) for curve in curves if curve.time_s is not None]
+    speed = np.abs(np.concatenate([speeds(travel[None], time[None])[0] for travel, time in timed]))
+    usual = float(np.median(speed))
+    other = np.mean((speed < _AS_FAST * usual) | (_AS_FAST * speed > usual))
+    if other > 1 / _ENDS:
         return ""
     times = values["drag_coefficient"] / (_OF_RADIUS * float(np.median([curve.indenter_radius_mm for curve in curves])))
     return (
         "At one speed a friction of the guide, constant against the motion, reads the same, and this is "
         f"{times:.1g} times the drag of water on the sphere: press at a second speed to tell them apart."
     )
-
-
-def usual_coefficient(conditions: Conditions) -> float:
-    """The coefficient that is expected for the spheres of the recordings [N·s/mm]."""
-    return _OF_RADIUS * float(np.median([curve.indenter_radius_mm for curve in _indentations(conditions)]))
-
-
-def is_at_one_speed(curves: Sequence[IndentationConditions]) -> bool:
-    """Whether each way of all curves is at one speed, without a hold: a drag and a constant friction then differ by a
-    zero of the force at most."""
-    timed = [(curve.displacement_mm, curve.time_s) for curve in curves if curve.time_s is not None]
-    speed = np.concatenate([speeds(travel[None], time[None])[0] for travel, time in timed])
-    shares = []
-    for way in (speed[speed > 0], -speed[speed < 0]):
-        usual = float(np.median(way)) if len(way) else 0.0
-        shares.append(float(np.sum((way < _AS_FAST * usual) | (_AS_FAST * way > usual))))
-    return sum(shares) + float(np.sum(speed == 0)) <= len(speed) / _ENDS
 
 
 def _indentations(conditions: Conditions) -> list[IndentationConditions]:
