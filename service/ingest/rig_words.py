@@ -10,7 +10,6 @@ KINDS = {
     "frf": "FRF: charge against a shaken force",
     "indentation": "indentation: force against depth",
     "compression": "compression or tension of a sample of the elastomer",
-    "tension": "tension of a strip or a rod, pull positive",
 }
 
 # Field, words, unit, and the kinds that have it.
@@ -28,11 +27,8 @@ RECORDING = (
     ("sample_rate_hz", "sample rate, if the file does not say", "Hz", ("frf",)),
     ("stage_stiffness_n_per_mm", "spring's stiffness, if a formula subtracts it", "N/mm", ("indentation",)),
     ("sample_height_mm", "sample's height", "mm", ("compression",)),
-    ("sample_length_mm", "strip's free length", "mm", ("tension",)),
-    ("sample_width_mm", "strip's width", "mm", ("tension",)),
-    ("sample_thickness_mm", "strip's thickness", "mm", ("tension",)),
-    ("sample_diameter_mm", "sample's diameter", "mm", ("compression", "tension")),
-    ("recorded_at", "date and time of recording", "", ("frf", "indentation", "compression", "tension")),
+    ("sample_diameter_mm", "sample's diameter", "mm", ("compression",)),
+    ("recorded_at", "date and time of recording", "", ("frf", "indentation", "compression")),
 )
 CHANNELS = {
     "force_n": "force",

@@ -126,9 +126,10 @@ def compression_machine(locale: Locale) -> Export:
 
 def units_behind_names(locale: Locale) -> Export:
     """Names with units, nothing else (MTS, LabVIEW tables)."""
-    lacks = "sample_length_mm" if locale["travel"] == "Extension" else "indenter_radius_mm"
     columns = curve(locale)
-    return Export([locale.joined(*bracketed(columns)), *locale.rows(*numbers(columns))], columns, lacks=lacks)
+    return Export(
+        [locale.joined(*bracketed(columns)), *locale.rows(*numbers(columns))], columns, lacks="indenter_radius_mm"
+    )
 
 
 def nanoindenter(locale: Locale) -> Export:

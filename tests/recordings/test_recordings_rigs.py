@@ -84,7 +84,7 @@ def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
     ("part", "changes", "message"),
     [
         ((), {"schema": "rig/2"}, "schema = 'rig/2': must be rig/1"),
-        ((), {"kind": "torsion"}, "kind = 'torsion': must be one of frf, indentation, compression, tension"),
+        ((), {"kind": "tension"}, "kind = 'tension': must be one of frf, indentation, compression"),
         ((), {"rig": 3}, "rig = 3: unknown field"),
         (("skin",), {"colour": 0.5}, r"skin\.colour = 0\.5: must be one of"),
         (("recording",), {"preload_n": 2.5}, r"recording\.preload_n = 2\.5: must be one of"),

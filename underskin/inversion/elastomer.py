@@ -73,9 +73,7 @@ def _of_compression(curve: CompressionRecording, _: SkinDescription) -> Compress
     result = small_strain_modulus(curve)
     as_no_solid = result.is_pressed and result.is_straight and result.last_strain > _STRAIGHTEST
     if orientation(curve).bends_as_other or (as_no_solid and not curve.signs_checked):
-        turned = with_turned(curve, (FORCE, TRAVEL))
-        assert isinstance(turned, CompressionRecording)
-        _require_load(result, small_strain_modulus(turned))
+        _require_load(result, small_strain_modulus(with_turned(curve, (FORCE, TRAVEL))))
     return result
 
 
@@ -86,9 +84,9 @@ def _require_load(stated: CompressionModulus, other: CompressionModulus) -> None
         return
     pressed, pulled = (stated, other) if stated.is_pressed else (other, stated)
     allowed = (
-        f"may be of a sample that was pressed (E {pressed.modulus / 1e6:.3g} MPa) or pulled "
-        f"({pulled.modulus / 1e6:.3g} MPa), and no modulus is stated: say which, by kind: tension of the rig "
-        "description, or by the sign (1 or -1) of both channels (compression positive)"
+        f"whether the sample was pressed (E {pressed.modulus / 1e6:.3g} MPa) or pulled ({pulled.modulus / 1e6:.3g} MPa) "
+        "is open, and no modulus is stated: say it, by kind: tension of the rig description, or by the sign (1 or -1) "
+        "of both channels (compression positive)"
     )
     raise unusable("force_n", None, allowed)
 
@@ -110,6 +108,6 @@ def _require_height(recording: CompressionRecording) -> None:
         raise unusable(
             "displacement_mm",
             moved,
-            f"{height}: is that height in mm, was the sample pulled (kind: tension of a rig description), or is this "
-            "exchanged with force_n?",
+            f"{height}: is that height in mm, was the sample pulled (tension counts negative), or is this exchanged "
+            "with force_n?",
         )

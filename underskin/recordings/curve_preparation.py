@@ -139,21 +139,6 @@ def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
     return _oriented(force[rows], travel[rows], sphere=sphere).negative
 
 
-def pull_is_positive(force: Floats, travel: Floats) -> tuple[bool, bool]:
-    """Whether force and travel, (samples,) in any unit, of a sample that was pulled are positive as it is: the force is
-    a pull, and the travel grows or falls with it; of one that was compressed as well, it softens in tension."""
-    rows = np.isfinite(force) & np.isfinite(travel) if len(force) == len(travel) else np.zeros(len(force), dtype=bool)
-    force, travel = force[rows], travel[rows]
-    if len(force) < _LEAST_TELLING:
-        return True, True
-    grows = _relative_sign(force, travel) >= 0
-    if is_one_sided(force):
-        positive = bool(force.max() > -force.min())
-    else:
-        positive = _softens_across(force, travel if grows else -travel)
-    return positive, positive == grows
-
-
 def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
     if len(force) != len(travel):
         return _UNKNOWN
@@ -169,8 +154,7 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
         reversed_columns = _of_block(force, travel, relative_sign)
         one_sided = is_one_sided(force)
         may_be_pulled = len(reversed_columns) > 1 and one_sided
-        is_pressed = not reversed_columns and one_sided and force.max() > -force.min()
-        bends_as_other = may_be_pulled or (is_pressed and _softens_at_first(force, travel))
+        bends_as_other = may_be_pulled or (not reversed_columns and one_sided and _softens_at_first(force, travel))
         return Orientation(
             reversed_columns, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled, bends_as_other=bends_as_other
         )
@@ -192,7 +176,7 @@ def _of_block(force: Floats, travel: Floats, relative_sign: int) -> tuple[str, .
         return tuple(name for name, falls in ((FORCE, softens), (TRAVEL, softens == (relative_sign > 0))) if falls)
     pulled = -float(force.min()) > float(force.max())
     if relative_sign > 0:
-        return (FORCE, TRAVEL) if pulled and not _softens_at_first(-force, -travel) else ()
+        return (FORCE, TRAVEL) if pulled and not _softens(-force, -travel) else ()
     return (FORCE,) if pulled else (TRAVEL,)
 
 

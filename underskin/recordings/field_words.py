@@ -52,13 +52,6 @@ WORDS: tuple[tuple[str, str, str], ...] = (
         rf"^(?=.*({_SAMPLE}))(?=.*(height|höhe|hauteur|altezza|altura|length|länge|longueur|lunghezza|longitud))",
     ),
     ("sample_diameter_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*(dia|durchmesser|diá))"),
-    (
-        "sample_length_mm",
-        "length",
-        r"gau?ge length|grip separation|(mess|einspann)länge|longueur utile|lunghezza utile",
-    ),
-    ("sample_width_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*(width|breite|largeur|larghezza|anchura))"),
-    ("sample_thickness_mm", "length", rf"^(?=.*({_SAMPLE}))(?=.*({_THICKNESS}))"),
     ("thickness_mm", "length", rf"\b({_THICKNESS})\b"),
     ("youngs_modulus_mpa", "pressure", r"young|\be[ -]?mod|[eé]l[aá]sti[ckqz]"),
     ("position_x_mm", "length", r"^(position x|x[ -]position)( |$)"),

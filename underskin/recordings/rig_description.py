@@ -53,7 +53,6 @@ from underskin.recordings.readers.expressions import Expression
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.readers.text import time_zone, with_zone
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
-from underskin.recordings.tension import READ_AS, SIZES, TENSION, Sample
 from underskin.recordings.validation import mapping, named, shown
 from underskin.units import LAB
 
@@ -191,8 +190,7 @@ class RigDescription:
     `"file"`, `"groups"`, a channel that separates curves, or None (each block is one). `derived` holds formulas by the
     names of the channels that they define, in their order; `joined` the channels that are joined to one, by its name.
     `entries` are the descriptions of each of several recordings in the same rows, `join` the part of a file's name
-    and what stands in its place in those of the other files of a recording. `is_pulled`: the samples are pulled (kind
-    `tension`, read as compression). `document` is as given."""
+    and what stands in its place in those of the other files of a recording. `document` is as given."""
 
     kind: str
     skin: Mapping[str, Any]
@@ -207,7 +205,6 @@ class RigDescription:
     joined: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
     entries: "tuple[RigDescription, ...]" = ()
     join: tuple[str, tuple[str, ...]] | None = None
-    is_pulled: bool = False
 
     @property
     def has_stated_signs(self) -> bool:
@@ -251,14 +248,10 @@ def from_dict(document: Any) -> RigDescription:
     if "recordings" in document:
         return _with_entries(document)
     kind, get = document.get("kind", DEFAULT_KIND), document.get
-    if not isinstance(kind, str) or kind not in (*KINDS, TENSION):
-        raise not_one_of("kind", shown(kind), (*KINDS, TENSION))
-    is_pulled = kind == TENSION
-    kind = READ_AS if is_pulled else kind
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise not_one_of("kind", shown(kind), KINDS)
     of_skin = {model_field.name for model_field in fields(SkinDescription)}
     of_recording = {model_field.name for model_field in fields(KINDS[kind])} - {"kind", "estimator"}
-    if is_pulled:
-        of_recording = of_recording - {"sample_height_mm"} | set(SIZES)
     given_channels, joined = _joined(get("channels"), kind)
     readings: dict[str, Callable[[], Any]] = {
         "name": lambda: field.name("name", get("name", SCHEMA), False),
@@ -276,11 +269,7 @@ def from_dict(document: Any) -> RigDescription:
     }
     values = all_of(readings)
     del values["name"]  # that of the document
-    rig = RigDescription(kind=kind, document=document, joined=joined, is_pulled=is_pulled, **values)
-    if is_pulled:
-        sizes = {name: rig.recording[name] for name in SIZES if name in rig.recording}
-        plain = {name: size for name, size in sizes.items() if not isinstance(size, Property | SignalMapping)}
-        _built(Sample, "recording", plain)
+    rig = RigDescription(kind=kind, document=document, joined=joined, **values)
     all_of({name: partial(_check_automatic_sign, rig, name) for name in rig.channels})
     return rig
 

@@ -30,7 +30,6 @@ from underskin.recordings.field_words import (
 from underskin.recordings.readers.text import time_zone, with_zone
 from underskin.recordings.readers.unit_labels import DECIBEL, decibel_reference, in_brackets, labelled_unit, unit
 from underskin.recordings.rig_description import AXES, COMPLEX_FRF, MAGNITUDE, PHASE, SCHEMA, channel_fields
-from underskin.recordings.tension import READ_AS, SIZES, TENSION
 
 _RATE = "sample_rate_hz"
 _BY_DIMENSION = {
@@ -47,9 +46,6 @@ _BY_DIMENSION = {
 }
 _MAGNITUDES = ("mag", "modulus", "|")  # as analysers call the absolute value of an FRF
 _OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
-_OF_TENSION = re.compile(
-    r"extension|elongation|tensile|\bdehnung|\bzug|traction|allongement|allungament|trazion|alargamient|tracci[oó]n"
-)
 _OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press with a spring call their channels
 _DEFLECTIONS = ("deflection", "cantilever", "durchbiegung")
 _OF_RECORDING = {
@@ -106,7 +102,6 @@ def of_contents(contents: Contents) -> dict[str, Any]:
     dated = any(block.recorded_at is not None for block in contents.blocks)
     document = guessed(columns, contents.properties, {}, list(texts), dated=dated)
     kind = document["kind"]
-    pulled = kind == READ_AS and is_pulled(columns) and not document["recording"].keys() >= {*_OF_RECORDING[kind]}
     document = {**document, **_entries(columns, document)}
     document["recording"] = {
         name: source for name, source in document["recording"].items() if not _is_measured(source, blocks)
@@ -118,13 +113,7 @@ def of_contents(contents: Contents) -> dict[str, Any]:
     optional += [_RATE] if rated or "force_n" not in document["channels"] else []
     optional += ["dynamic_force_n"] if "force_n" in document["channels"] else []
     optional += ["sensor"] if kind == "indentation" or "recordings" in document else []
-    if pulled:
-        document = {
-            **document,
-            "kind": TENSION,
-            "recording": _size_of_pulled(document["recording"], contents.properties),
-        }
-    needed = [name for name in _OF_RECORDING[kind] if name not in optional] if not pulled else []
+    needed = [name for name in _OF_RECORDING[kind] if name not in optional]
     skin = [name for name in OF_SKIN if kind == "frf" or name == "poisson_ratio"]
     sensors = _sensors(contents, document)
     if kind == "frf" and not sensors:
@@ -138,19 +127,6 @@ def of_contents(contents: Contents) -> dict[str, Any]:
         },
         "recording": {**dict.fromkeys(needed), **document["recording"]},
     }
-
-
-def _size_of_pulled(recording: Mapping[str, Any], properties: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of recordings of a sample that is pulled, with its size as the file states it, or `None`."""
-    length, width, thickness, diameter = SIZES
-    stated = {field: {"property": names[0]} for field, names in _stated_names(properties).items()}
-    of_section = (diameter,) if diameter in stated else (width, thickness)
-    sizes = {
-        length: stated.get(length, stated.get("sample_height_mm")),
-        **{name: stated.get(name) for name in of_section},
-    }
-    others = {name: value for name, value in recording.items() if name not in ("sample_height_mm", diameter)}
-    return {**sizes, **others}
 
 
 def _is_measured(source: Any, blocks: Sequence[Block]) -> bool:
@@ -249,7 +225,7 @@ def guessed(
 def likely(columns: Sequence[Column], properties: Mapping[str, Any] = MappingProxyType({})) -> tuple[str, list[str]]:
     """The kind of recording, and the likely field of each channel; empty if there is no indication.
 
-    A file that states a sample's size, or an extension, and no sphere, is of a sample between plates or clamps.
+    A file that states a sample's size, and no sphere, is of a sample between plates or clamps.
     """
     dimensions = [_dimension(column) for column in columns]
     kind = "frf"
@@ -259,7 +235,7 @@ def likely(columns: Sequence[Column], properties: Mapping[str, Any] = MappingPro
     if "length" in dimensions and not charged:
         named = any(words in column.name.lower() for column in columns for words in _OF_COMPRESSION)
         stated = _stated_names(properties)
-        sized = is_pulled(columns) or not stated.keys().isdisjoint(("sample_height_mm", "sample_diameter_mm"))
+        sized = not stated.keys().isdisjoint(("sample_height_mm", "sample_diameter_mm"))
         kind = "compression" if named or (sized and "indenter_radius_mm" not in stated) else "indentation"
     elif not charged and any(word in column.name.lower() for column in columns for word in _OF_SPRINGS):
         kind = "indentation"
@@ -286,13 +262,6 @@ def likely(columns: Sequence[Column], properties: Mapping[str, Any] = MappingPro
     return kind, [
         "" if is_of_row and field in sampled else field for field, is_of_row in zip(fields, of_rows, strict=True)
     ]
-
-
-def is_pulled(columns: Sequence[Column]) -> bool:
-    """Whether the channels are called as those of a sample that is pulled, and none as of what presses."""
-    names = [column.name.lower() for column in columns]
-    presses = any(words in name for name in names for words in (*_OF_COMPRESSION, *_OF_SPRINGS))
-    return any(map(_OF_TENSION.search, names)) and not presses
 
 
 def _dimension(column: Column) -> str:

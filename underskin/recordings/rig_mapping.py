@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from underskin.errors import FileError, Mention, Requirement
-from underskin.recordings import tension
 from underskin.recordings.campaign import KINDS, SCHEMA
 from underskin.recordings.channels import Block, Channel, Contents, Values, text_left_out
 from underskin.recordings.curve_preparation import falling
@@ -121,12 +120,8 @@ class MappedBlock:
         columns = {field: self._tared(field, column) for field, column in columns.items()}
         columns = self._without_instrument(columns)
         self._say_ranges(columns)
-        if self.rig.is_pulled:
-            columns = tension.turned(columns, signs_stated=self.rig.has_stated_signs)
-        else:
-            self._require_stated_sign(columns)
-        signs_checked = self.rig.is_pulled or self.rig.has_stated_signs
-        return self._of_kind(columns) | ({"signs_checked": True} if signs_checked else {})
+        self._require_stated_sign(columns)
+        return self._of_kind(columns) | ({"signs_checked": True} if self.rig.has_stated_signs else {})
 
     def _of_kind(self, columns: dict[str, Any]) -> dict[str, Any]:
         """Curves with the times that the sample rate gives."""
@@ -187,7 +182,7 @@ class MappedBlock:
                 values[field] = self._common_value(field, value)
             except UnreadableTime as error:
                 self.warnings.append(str(error))
-        return tension.of_sample(values, self.file) if self.rig.is_pulled else values
+        return values
 
     def _common_value(self, field: str, value: Any) -> Any:
         """The value of a field in its unit; of lists and mappings of each part."""
