@@ -17,19 +17,9 @@ from underskin.recordings.campaign import (
     IndentationRecording,
     SkinDescription,
 )
-from underskin.recordings.curve_preparation import (
-    FORCE,
-    TRAVEL,
-    orientation,
-    prepared,
-    reject_exchanged_columns,
-    with_turned,
-)
+from underskin.recordings.curve_preparation import prepared, reject_exchanged_columns
 from underskin.recordings.modulus import IndentationModulus, of_indentation
 from underskin.surrogate.hdf5_format import load_contact
-
-_STRAIGHTEST = 0.3  # strain to which no incompressible solid is straight: pressed so far, the neo-Hookean is 45 % above
-_DIFFER = 2.0  # standard deviations, by which two moduli differ: 95 %
 
 
 @dataclass(frozen=True)
@@ -70,25 +60,7 @@ def _of_indentation(curve: IndentationRecording, skin: SkinDescription) -> Inden
 
 def _of_compression(curve: CompressionRecording, _: SkinDescription) -> CompressionModulus:
     _require_height(curve)
-    result = small_strain_modulus(curve)
-    as_no_solid = result.is_pressed and result.is_straight and result.last_strain > _STRAIGHTEST
-    if orientation(curve).bends_as_other or (as_no_solid and not curve.signs_checked):
-        _require_load(result, small_strain_modulus(with_turned(curve, (FORCE, TRAVEL))))
-    return result
-
-
-def _require_load(stated: CompressionModulus, other: CompressionModulus) -> None:
-    """Raise InvalidInput where the modulus of a sample under the other load than its signs state is not within the
-    uncertainty of that by its signs, while its curve is rather that of the other."""
-    if abs(stated.modulus - other.modulus) < _DIFFER * stated.uncertainty:
-        return
-    pressed, pulled = (stated, other) if stated.is_pressed else (other, stated)
-    allowed = (
-        f"whether the sample was pressed (E {pressed.modulus / 1e6:.3g} MPa) or pulled ({pulled.modulus / 1e6:.3g} MPa) "
-        "is open, and no modulus is stated: say it, by kind: tension of the rig description, or by the sign (1 or -1) "
-        "of both channels (compression positive)"
-    )
-    raise unusable("force_n", None, allowed)
+    return small_strain_modulus(curve)
 
 
 _MODULUS: Mapping[str, Callable[[Any, SkinDescription], CompressionModulus | IndentationModulus]] = {

@@ -46,10 +46,8 @@ _AGREE = 0.2  # majority of one sign among the changes, as a share of all
 _NEAR = 0.15  # of the range of travel, over which the stiffness at a turn is computed
 _HELD = 0.02  # of that distance from the turn: samples within it are a hold, of which one counts
 _STIFFER = 1.15  # least ratio of stiffness of the deep end to the other
-_BUCKLED = 0.6  # strain up to which the load of a buckled column is known not to double
 _LONGEST = 0.9  # of a block's height: a larger displacement is no compression
 _BOW = 0.02  # of the range of force, by which a softening curve lies above its chord on average
-_STARTS, _BOW_AT_FIRST = (0.5, 0.25), 0.005  # the same of its start, up to shares of the largest force
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,8 @@ class Orientation:
     deep end follows from the stiffness, rather than being assumed from the direction of the first movement.
     `may_be_pulled`: both columns of a block are negative, which is right for tension. `bends_as_other`: a block has the
     signs of one load, and its curve bends as under the other: a solid softens as it is pulled and stiffens as it is
-    pressed, a foam the other way round. `must_be_pulled`: why a sample whose signs are those of compression was pulled.
+    pressed, a foam the other way round. `must_be_pulled`: it bends so, moves farther than its height allows, and is
+    within noise that of a neo-Hookean strip.
     """
 
     negative: tuple[str, ...]
@@ -68,7 +67,7 @@ class Orientation:
     is_deep_end_known: bool
     may_be_pulled: bool = False
     bends_as_other: bool = False
-    must_be_pulled: str = ""
+    must_be_pulled: bool = False
 
 
 _UNKNOWN = Orientation((), np.zeros(0, dtype=np.intp), is_deep_end_known=False)
@@ -80,49 +79,13 @@ def orientation(recording: CurveRecording) -> Orientation:
     oriented = _oriented(force, travel, sphere=recording.has_sphere)
     if recording.signs_checked:
         return replace(oriented, negative=(), may_be_pulled=False, bends_as_other=False)
-    if isinstance(recording, CompressionRecording) and oriented.is_deep_end_known and _would_buckle(recording):
-        return _of_pulled(recording, oriented)
     if not oriented.bends_as_other or not np.nanmax(np.abs(travel)) > _LONGEST * recording.height_mm:
         return oriented
     if oriented.may_be_pulled:
         return replace(oriented, negative=(), may_be_pulled=False)
     if not _is_strip(with_turned(recording, (FORCE, TRAVEL))):
         return oriented  # its height may be wrong: what is pressed or pulled so far is refused
-    why = f"no block of {recording.height_mm:.4g} mm is pressed {np.nanmax(np.abs(travel)):.4g} mm"
-    return replace(oriented, negative=(FORCE, TRAVEL), bends_as_other=False, must_be_pulled=why)
-
-
-def _buckles_at(recording: CompressionRecording) -> float:
-    """The strain at which a column between platens buckles: Euler's load with both ends clamped, 4π² E I/H², over E A.
-
-    Of a round section it is (π D/2H)²; of a strip it is less.
-    """
-    return float((np.pi / 2 * recording.sample_diameter_mm / recording.sample_height_mm) ** 2)
-
-
-def _would_buckle(recording: CompressionRecording) -> bool:
-    """Whether a sample bears what no slender column bears that is pressed so far: a buckled one bears about its
-    critical load, and at three fifths of its height less than 1.6 times as much (the elastica)."""
-    finite = finite_rows(recording)
-    force, travel = (np.abs(column[finite]) for column in (recording.force_n, recording.displacement_mm))
-    if not len(finite) or not is_one_sided(recording.force_n[finite]):
-        return False
-    strain, critical = np.abs(travel - travel[force.argmin()]) / recording.sample_height_mm, _buckles_at(recording)
-    before, after = strain <= critical, (strain > 2 * critical) & (strain < _BUCKLED)
-    return bool(before.any() and after.any() and force[after].max() > 2 * force[before].max() > 0)
-
-
-def _of_pulled(recording: CompressionRecording, oriented: Orientation) -> Orientation:
-    """The signs of a one-sided curve of a sample that was pulled."""
-    is_negative, are_opposite = bool(np.nansum(recording.force_n) < 0), len(oriented.negative) == 1
-    falls = {FORCE: not is_negative, TRAVEL: is_negative == are_opposite}
-    negative = tuple(name for name in (FORCE, TRAVEL) if falls[name])
-    why = (
-        f"a column of {recording.sample_height_mm:.4g} mm, {recording.sample_diameter_mm:.3g} mm across, buckles when "
-        f"it is pressed by {100 * _buckles_at(recording):.2g} %"
-    )
-    pulled = replace(oriented, negative=negative, may_be_pulled=False, bends_as_other=False)
-    return replace(pulled, must_be_pulled=why) if len(negative) > 1 else pulled
+    return replace(oriented, negative=(FORCE, TRAVEL), bends_as_other=False, must_be_pulled=True)
 
 
 def _is_strip(recording: CurveRecording) -> bool:
@@ -154,7 +117,7 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
         reversed_columns = _of_block(force, travel, relative_sign)
         one_sided = is_one_sided(force)
         may_be_pulled = len(reversed_columns) > 1 and one_sided
-        bends_as_other = may_be_pulled or (not reversed_columns and one_sided and _softens_at_first(force, travel))
+        bends_as_other = may_be_pulled or (not reversed_columns and one_sided and _softens(force, travel))
         return Orientation(
             reversed_columns, turns, is_deep_end_known=True, may_be_pulled=may_be_pulled, bends_as_other=bends_as_other
         )
@@ -189,31 +152,12 @@ def _softens_across(force: Floats, strain: Floats) -> bool:
 
 def _softens(force: Floats, strain: Floats) -> bool:
     """Whether the curve softens with strain: on average the force lies above the chord."""
-    return _bow(*_by_strain(force, strain))[0] > _BOW
-
-
-def _softens_at_first(force: Floats, strain: Floats) -> bool:
-    """Whether a curve softens with strain, or its start does beyond noise: a strip softens as it is pulled and stiffens
-    at last."""
-    force, strain = _by_strain(force, strain)
-    starts = [int(np.argmax(force >= share * force.max())) + 1 for share in _STARTS]
-    bows = [_bow(force[:count], strain[:count], roughness(force)) for count in starts if count >= _LEAST_TELLING]
-    return _bow(force, strain)[0] > _BOW or any(bow > max(_BOW_AT_FIRST, _BEYOND_NOISE * sd) for bow, sd in bows)
-
-
-def _by_strain(force: Floats, strain: Floats) -> tuple[Floats, Floats]:
     order = np.argsort(strain, kind="stable")
-    return force[order], strain[order]
-
-
-def _bow(force: Floats, strain: Floats, noise: float = 0.0) -> tuple[float, float]:
-    """By how much a curve lies above its chord on average, of the range of force, and the deviation by noise."""
+    strain, force = strain[order], force[order]
     tail = max(1, len(force) // 20)
     low, high = float(np.mean(force[:tail])), float(np.mean(force[-tail:]))
-    if not high > low:
-        return -np.inf, 0.0
     area = float(np.trapezoid(force - low, strain)) / max(float(np.ptp(strain)), 1e-300)
-    return area / (high - low) - 0.5, noise * float(np.sqrt(0.5 / tail + 1 / len(force))) / (high - low)
+    return area > (0.5 + _BOW) * (high - low)
 
 
 def _relative_sign(force: Floats, travel: Floats) -> int:
@@ -295,8 +239,8 @@ def _counted(curves: Iterable[tuple[CurveRecording, Orientation]]) -> list[Findi
     pulled = []
     for curve, oriented in curves:
         if oriented.must_be_pulled:
-            arguments = {"pulled": True, "why": oriented.must_be_pulled}
-            pulled.append(Finding(Reason.COUNTED_AS_OTHER_LOAD, curve.id, FORCE, arguments))
+            why = f"no block of {curve.height_mm:.4g} mm is pressed {np.nanmax(np.abs(curve.displacement_mm)):.4g} mm"
+            pulled.append(Finding(Reason.COUNTED_AS_OTHER_LOAD, curve.id, FORCE, {"pulled": True, "why": why}))
             continue
         alike.setdefault((curve.kind, oriented.negative, oriented.may_be_pulled), []).append(curve.id)
     return [
