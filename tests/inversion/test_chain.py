@@ -233,26 +233,6 @@ def test_a_band_behind_a_filter_is_told_beside_d33(chain: Any, named: str, table
     assert low < D33 < high or any(named in sentence for sentence in told), (value, told)
 
 
-@pytest.mark.parametrize(
-    "chain", [low_pass(5.0), low_pass(10.0), low_pass(30.0), low_pass(100.0), low_pass(40.0, 2), high_pass(40.0)]
-)
-def test_filter_of_the_force(chain: Any, table: SigmaTable) -> None:
-    """A filter of the force alone makes no d33 too small: it is right, or said to be too large by what it is; where no
-    plateau shows it may be that of either channel."""
-    inversion = invert(shaken(force=chain), table)
-    value, low, high = array_d33(inversion)
-    told = [finding for finding in inversion.findings if finding.code == FindingCode.BEHIND_FILTER]
-    assert FindingCode.CONSTANT_PHASE not in codes(inversion)
-    if not told:
-        assert low < D33 < high
-    elif told[0].arguments["either"]:
-        assert "where d33 is too small, or a low-pass of the force, where it may be too large" in told[0].sentence
-    else:
-        assert "in the force channel" in told[0].sentence
-        assert value / (1 - told[0].arguments["percent"] / 100) == pytest.approx(D33, rel=0.03)
-        assert "d33 is too large by" in told[0].sentence
-
-
 @pytest.mark.parametrize("corner_hz", [60.0, 80.0, 120.0])
 @pytest.mark.parametrize("polarity", [1.0, -1.0])
 def test_two_poles_hide_no_sign(corner_hz: float, polarity: float, table: SigmaTable) -> None:

@@ -21,10 +21,10 @@ from underskin.recordings.frf.flat_zone import (
     flat_zone,
     lower_half,
     mains_lines,
+    roll_off,
     without_chain_phase,
 )
 from underskin.recordings.frf.line_choice import usable_lines
-from underskin.recordings.frf.roll_off import roll_off
 from underskin.recordings.frf.spectra import Frf, stacked
 from underskin.units import Complexes, Floats
 
@@ -221,7 +221,7 @@ def test_filter_bends_no_mains_line_and_loses_what_is_said(name: str, grid: Floa
     assert mains_lines(stacks) == ()
     zone = flat_zone(stacks, [(4.0, preload) for preload in PRELOADS[:3]])
     level, _, _ = band_average(stacks, zone)
-    behind = roll_off(stacks, zone.low_hz, zone.high_hz, level)
+    behind = roll_off(stacks, zone, level)
     stated = 0.0 if behind is None else behind.share  # losses below 2 % are not stated
     assert stated == pytest.approx(1 - abs(float(np.median(level))) / 7e-12, abs=0.02)
     at = int(np.argmin(np.abs(grid - 50)))

@@ -235,50 +235,26 @@ def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
     )
 
 
-def _filters(high_pass_hz: float, low_pass_hz: float, *, of_force: bool) -> str:
+def _filters(high_pass_hz: float, low_pass_hz: float) -> str:
     filters = [f"a high-pass of about {in_digits(high_pass_hz, 2)} Hz"] if high_pass_hz > 0 else []
-    filters += [f"a low-pass of about {in_digits(low_pass_hz, 2)} Hz"] if low_pass_hz < math.inf else []
-    return f"{' and '.join(filters)}{' in the force channel' if of_force else ''}"
+    filters += [f"a low-pass of about {in_digits(low_pass_hz, 2)} Hz"] if low_pass_hz < float("inf") else []
+    return " and ".join(filters)
 
 
-def _off(percent: float, *, of_force: bool) -> str:
-    return f"too {'large' if of_force else 'small'} by about {in_digits(abs(percent), 2)} %"
-
-
-def behind_filter(
-    *,
-    high_pass_hz: float,
-    low_pass_hz: float,
-    percent: float,
-    low_hz: float,
-    high_hz: float,
-    of_force: bool,
-    either: bool,
-) -> str:
+def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_hz: float, high_hz: float) -> str:
     """A band behind filters."""
-    if either:
-        course, charge, force = ("rises", "high", "low") if high_pass_hz > 0 else ("falls", "low", "high")
-        return (
-            f"from {low_hz:.4g} to {high_hz:.4g} Hz the response {course} without a plateau, as behind a {charge}-pass "
-            f"of the charge, where d33 is too small, or a {force}-pass of the force, where it may be too large: not "
-            "to be quoted; record a band that reaches the plateau"
-        )
-    further = "" if of_force else "a diagnosis takes the filter into account, or "
     return (
-        f"from {low_hz:.4g} to {high_hz:.4g} Hz the response is that behind "
-        f"{_filters(high_pass_hz, low_pass_hz, of_force=of_force)}, and does not reach its plateau: d33 is "
-        f"{_off(percent, of_force=of_force)}, and not to be quoted; {further}record a band further off its corner"
+        f"from {low_hz:.4g} to {high_hz:.4g} Hz the response is that behind {_filters(high_pass_hz, low_pass_hz)}, and "
+        f"does not reach its plateau: d33 is too small by about {in_digits(percent, 2)} %, and not to be quoted; a "
+        "diagnosis takes the filter into account, or record a band further off its corner"
     )
 
 
-def sensor_behind_filter(
-    *, high_pass_hz: float, low_pass_hz: float, percent: float, of_force: bool, either: bool
-) -> str:
+def sensor_behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float) -> str:
     """A sensor behind filters that the others are not behind."""
-    size = "too small or too large" if either else _off(percent, of_force=of_force)
     return (
-        f"behind {_filters(high_pass_hz, low_pass_hz, of_force=of_force)} that the others are not behind: its d33 is "
-        f"{size}, and not to be quoted"
+        f"behind {_filters(high_pass_hz, low_pass_hz)} that the others are not behind: its d33 is too small by about "
+        f"{in_digits(percent, 2)} %, and not to be quoted"
     )
 
 

@@ -62,13 +62,14 @@ from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, ex
 from underskin.recordings.frf.estimation import exchanged_channels
 from underskin.recordings.frf.flat_zone import (
     FlatZone,
+    RollOff,
     band_average,
     flat_zone,
     lower_half,
+    roll_off,
     without_chain_phase,
 )
 from underskin.recordings.frf.line_choice import excited_at_mains, gain_findings, noise_findings
-from underskin.recordings.frf.roll_off import RollOff, roll_off
 from underskin.recordings.frf.series_lines import at_two_levels, chosen_lines, of_spoilt
 from underskin.recordings.frf.spectra import Frf, Stack, left_out_of, mean_of, stacked
 from underskin.recordings.plausibility import UNUSED_FOR_D33, at_reading, unlikely
@@ -275,8 +276,7 @@ def _own_filters(ids: Sequence[str], sensor: Indices, levels: "Levels") -> dict[
     usual = float(np.sort(of_line)[(len(ids) - 1) // 2])
     flags = {}
     for index in np.flatnonzero(of_line > _NOISY * usual).tolist():
-        own = [one.of(sensor[one.rows] == index) for one in levels.stacks]
-        behind = roll_off(own, levels.zone.low_hz, levels.zone.high_hz, levels.level)
+        behind = roll_off([one.of(sensor[one.rows] == index) for one in levels.stacks], levels.zone, levels.level)
         if behind is not None:
             flags[index] = Flag(ids[index], Reason.SENSOR_BEHIND_FILTER, behind.arguments)
     return flags
@@ -368,8 +368,8 @@ class Levels:
 
     @cached_property
     def behind(self) -> RollOff | None:
-        """The filters that the whole band lies behind."""
-        return roll_off(self.stacks, self.zone.low_hz, self.zone.high_hz, self.level)
+        """The filters that attenuate the whole band."""
+        return roll_off(self.stacks, self.zone, self.level)
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,18 @@ which no condition departs, beyond its noise, from a power law common to all (a 
 more than `FLATNESS`. Outstanding lines at the mains and its harmonics and unused lines (`line_choice`) are left out. A
 delay or a constant phase common to all recordings is removed before (`without_chain_phase`): Re FRF is the response
 where the charge is in phase with the force. `reason_of` words why the zone ends where it does.
+
+`roll_off` decides whether the band lies behind a high-pass or a low-pass. The magnitude over frequency, in bins over
+all recordings and up to where a resonance lifts it, is fitted by a plateau with a slight power law and two filters,
+    ln |FRF| = a − n ln f − ½ ln(1 + (f1/f)²) − (m/2) ln(1 + (f/f2)^(2k)),   0 ≤ n ≤ `STEEPEST`.
+A filter counts where it explains the fall and the plateau lies beyond the band: then the band's average is no d33.
 """
 
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -23,7 +30,6 @@ from underskin.recordings.frf.line_choice import (
     edges_over,
     near_mains,
 )
-from underskin.recordings.frf.roll_off import OF_A_MEDIAN, STEEPEST, RollOff, roll_off
 from underskin.recordings.frf.spectra import Stack
 from underskin.units import Floats, Indices, Mask
 
@@ -120,6 +126,7 @@ def _below(low_hz: float, departure: Floats) -> str:
 
 
 FLATNESS = 0.02
+STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tangent of 0.16)
 _BEYOND_NOISE = 3.0
 SUPPORTED_NATS = 3.0  # as of a law without a free parameter in a diagnosis
 _COURSE = 4  # degree of the course through the neighbours of a mains line
@@ -457,6 +464,64 @@ def _is_flat(log_frequency: Floats, curves: Floats, noise: Floats, slope: float)
     return not bool(np.any(departure > FLATNESS))
 
 
+_FEWEST_BINS = 6
+_CORNERS = 60  # corner frequencies tried for each filter
+_BELOW, _ABOVE = 30.0, 10.0  # range of corner frequencies, as factors on the ends of the band
+_LOW_PASSES = ((1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (1, 4))  # k and m: Butterworth's of order k, m times in a row
+_HIGH_PASSES = ((1, 1), (2, 1), (1, 2))
+_FIRST_ORDER = (1, 1)
+_LEAST_NOISE = 0.003  # of a bin's magnitude
+_SEVERAL, _USUAL_NOISE = 4, 0.02  # lines of a bin that determine its scatter, and the default scatter
+_LIFTED = 1.05  # of the plateau: a resonance
+_LEAST_SHARE = 0.02  # least reported loss, of the plateau
+_SPEAKS = 25.0  # least reduction of χ² by a filter
+_EXPLAINED = 0.2  # largest remaining rms, of that about a plateau
+
+
+@dataclass(frozen=True)
+class RollOff:
+    """The filters, and the loss of the band's level relative to the plateau."""
+
+    filters: "Filters"
+    share: float
+
+    @property
+    def arguments(self) -> dict[str, float]:
+        """The corners and the loss as findings state them."""
+        corners = {"high_pass_hz": self.filters.high_hz, "low_pass_hz": self.filters.low_hz}
+        return {**corners, "percent": 100 * self.share}
+
+
+def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff | None:
+    """The filters that attenuate the band; None where it reaches their plateau. `level` (recordings,): the average over
+    the zone [C/N]."""
+    frequency, magnitude, noise = _curve(stacks, level)
+    inside = (frequency >= zone.low_hz) & (frequency <= zone.high_hz)
+    lifted = np.flatnonzero(magnitude > _LIFTED * np.median(magnitude[inside])) if inside.any() else np.zeros(0, int)
+    lifted = lifted[frequency[lifted] > zone.high_hz]
+    if len(lifted) and magnitude[-1] >= 0.8 * magnitude[lifted[0] :].max():
+        lifted = lifted[:0]  # no peak: a high-pass that goes on rising
+    end = int(lifted[0]) if len(lifted) else len(frequency)
+    if end < _FEWEST_BINS:
+        return None
+    curve = _Curve(np.log(frequency[:end]), np.log(magnitude[:end]), noise[:end] ** -2.0, np.log(zone.middle_hz))
+    plain = curve.fitted(Filters())[0]
+    if plain < _SPEAKS:
+        return None
+    highs = np.geomspace(frequency[0] / _BELOW, frequency[end - 1] * _ABOVE, _CORNERS)
+    lows = np.geomspace(frequency[0] / _ABOVE, frequency[end - 1] * _BELOW, _CORNERS)
+    single = [Filters(high_hz=high, high_pass=kind) for high in highs.tolist() for kind in _HIGH_PASSES]
+    single += [Filters(low_hz=low, low_pass=kind) for low in lows.tolist() for kind in _LOW_PASSES]
+    pairs = [Filters(high, low) for high, low in product(highs[::2].tolist(), lows[::2].tolist()) if high < low]
+    best, both = (curve.refined(min(every, key=lambda filters: curve.fitted(filters)[0])) for every in (single, pairs))
+    if curve.fitted(best)[0] - curve.fitted(both)[0] > _SPEAKS:
+        best = both
+    misfit, plateau = curve.fitted(best)
+    share = 1 - float(np.exp(-plateau))
+    is_explained = plain - misfit >= _SPEAKS and misfit <= _EXPLAINED**2 * plain + len(curve.x)
+    return RollOff(best, share) if is_explained and share >= _LEAST_SHARE else None
+
+
 def without_chain_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) -> tuple[list[Stack], float, float]:
     """The FRFs without the phase of the charge's chain; the delay [s] and the constant phase [rad] that were removed.
 
@@ -472,7 +537,7 @@ def without_chain_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]
     if delay:
         undelayed = [stack.at(stack.frequency > 0) for stack in without_delay(stacks, delay)]
         lowest = float(np.concatenate([stack.frequency for stack in undelayed]).min())
-        behind = _behind_filter(undelayed, flat_zone(undelayed, conditions), len(conditions))
+        behind = roll_off(undelayed, flat_zone(undelayed, conditions), _magnitude(undelayed, len(conditions)))
         if behind is not None:
             turns = [np.exp(-1j * behind.filters.phase(np.maximum(stack.frequency, lowest))) for stack in stacks]
             stacks = [replace(stack, values=stack.values * turn) for stack, turn in zip(stacks, turns, strict=True)]
@@ -487,13 +552,9 @@ def _constant_phase(stacks: Sequence[Stack], conditions: Sequence[Condition]) ->
     zone = flat_zone(sizes, conditions)
     inside = [stack.at(lines) for stack in stacks if (lines := zone.holds(stack.frequency)).any()]
     constant = common_phase(inside)
-    if abs(constant) <= STEEPEST * np.pi / 2 or _behind_filter(sizes, zone, len(conditions)) is not None:
+    if abs(constant) <= STEEPEST * np.pi / 2 or roll_off(sizes, zone, _magnitude(sizes, len(conditions))) is not None:
         return 0.0
     return constant
-
-
-def _behind_filter(stacks: Sequence[Stack], zone: FlatZone, count: int) -> RollOff | None:
-    return roll_off(stacks, zone.low_hz, zone.high_hz, _magnitude(stacks, count))
 
 
 def _magnitude(stacks: Sequence[Stack], count: int) -> Floats:
@@ -504,8 +565,115 @@ def _magnitude(stacks: Sequence[Stack], count: int) -> Floats:
     return level
 
 
+@dataclass(frozen=True)
+class Filters:
+    """Corner frequencies [Hz], 0 and ∞ without one, and kinds (k, m) of a high-pass and a low-pass."""
+
+    high_hz: float = 0.0
+    low_hz: float = np.inf
+    high_pass: tuple[int, int] = _FIRST_ORDER
+    low_pass: tuple[int, int] = _FIRST_ORDER
+
+    def log_gain(self, frequency: Floats) -> Floats:
+        """ln of the filters' magnitude at these frequencies [Hz]."""
+        (high_order, high_times), (low_order, low_times) = self.high_pass, self.low_pass
+        return -0.5 * (
+            high_times * np.log1p((self.high_hz / frequency) ** (2 * high_order))
+            + low_times * np.log1p((frequency / self.low_hz) ** (2 * low_order))
+        )
+
+    def phase(self, frequency: Floats) -> Floats:
+        """The filters' phase [rad] at these frequencies [Hz], 0 on the plateau."""
+        return _lag(self.high_hz / frequency, *self.high_pass) - _lag(frequency / self.low_hz, *self.low_pass)
+
+
+def _lag(ratio: Floats, order: int, times: int) -> Floats:
+    """The lag [rad] of Butterworth's low-pass, so many times in a row, at these multiples of its corner."""
+    poles = np.exp(0.5j * np.pi * (2 * np.arange(order) + order + 1) / order)
+    return np.asarray(times * np.angle(1j * ratio[:, None] - poles).sum(axis=1))
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """ln f `x`, ln of the magnitude `y` and its `weight` (bins,), and ln of the frequency `at` which the plateau is
+    stated."""
+
+    x: Floats
+    y: Floats
+    weight: Floats
+    at: float
+
+    def fitted(self, filters: Filters) -> tuple[float, float]:
+        """χ² of the best plateau and slope behind these filters, and the logarithm of the plateau at `at`."""
+        total, middle, x, variance = self._centred
+        y = self.y - filters.log_gain(self._frequency)
+        level = float((y * self.weight).sum() / total)
+        slope = float(np.clip((self.weight * x * y).sum() / variance, -STEEPEST, 0.0))
+        return float((self.weight * (y - level - slope * x) ** 2).sum()), level + slope * (self.at - middle)
+
+    @cached_property
+    def _frequency(self) -> Floats:
+        return np.exp(self.x)
+
+    @cached_property
+    def _centred(self) -> tuple[float, float, Floats, float]:
+        """Sum of the weights, weighted mean of `x`, `x` less it, and its weighted sum of squares."""
+        total = float(self.weight.sum())
+        middle = float((self.x * self.weight).sum() / total)
+        x = self.x - middle
+        return total, middle, x, float((self.weight * x**2).sum())
+
+    def refined(self, filters: Filters) -> Filters:
+        """The filters with the corners that fit best near their own."""
+        from scipy.optimize import minimize  # takes 0.3 s to load, which few need
+
+        names = [name for name in ("high_hz", "low_hz") if 0 < getattr(filters, name) < np.inf]
+        start: Floats = np.log(np.array([getattr(filters, name) for name in names], dtype=np.float64))
+
+        def moved(corners: Floats) -> Filters:
+            return replace(filters, **dict(zip(names, np.exp(corners).tolist(), strict=True)))
+
+        def misfit(corners: Floats) -> float:
+            return self.fitted(moved(corners))[0]
+
+        near = start[:, None] + np.log(_BELOW) * np.array([-1.0, 1.0])
+        return moved(np.asarray(minimize(misfit, start, method="Nelder-Mead", bounds=near).x, dtype=np.float64))
+
+
+def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floats]:
+    """For non-empty bins of equal width in ln f: the middle of its lines [Hz], the median over recordings of the
+    magnitude over their level, and its relative noise."""
+    lines = [stack.frequency[stack.used.any(axis=0)] for stack in stacks]
+    edges = edges_over(np.unique(np.concatenate(lines)))
+    cells: list[list[Floats]] = [[] for _ in edges[1:]]  # (recordings, 4): middle, magnitude, scatter, lines
+    for stack in stacks:
+        bins, own_level = bin_of(stack.frequency, edges), level[stack.rows]
+        known = np.isfinite(own_level) & (own_level != 0)
+        size, used = np.abs(stack.values[known]) / np.abs(own_level[known, None]), stack.used[known]
+        for bin_index in np.unique(bins).tolist() if known.any() else ():
+            inside = np.flatnonzero(bins == bin_index)
+            choices, choice_of_row = np.unique(used[:, inside], axis=0, return_inverse=True)  # mostly all lines
+            choice_of_row = choice_of_row.reshape(-1)  # NumPy 2.0 returns (rows, 1)
+            for number in np.flatnonzero(choices.any(axis=1)).tolist():
+                of_choice = inside[choices[number]]
+                chosen = size[np.ix_(choice_of_row == number, of_choice)]
+                middle_hz = np.median(stack.frequency[of_choice])
+                columns = middle_hz, np.median(chosen, axis=1), np.std(chosen, axis=1), len(of_choice)
+                cells[bin_index].append(np.stack(np.broadcast_arrays(*columns), axis=1).astype(np.float64))
+    tables = [np.concatenate(of_bin).T for of_bin in cells if of_bin]
+    several = np.concatenate([scatter[count >= _SEVERAL] for _, _, scatter, count in tables]) if tables else np.zeros(0)
+    usual = float(np.median(several)) if len(several) else _USUAL_NOISE
+    filled = [part for part in tables if np.median(part[1]) > 0]
+    middle, magnitude = np.array([np.median(part[:2], axis=1) for part in filled]).reshape(-1, 2).T
+    # Of a median over recordings; with few lines their deviation is at least the usual one
+    errors = [np.maximum(part[2], np.where(part[3] < _SEVERAL, usual, 0.0)) / np.sqrt(part[3]) for part in filled]
+    noise = np.array([_OF_A_MEDIAN * float(np.median(error)) / len(error) ** 0.5 for error in errors])
+    return middle, magnitude, np.maximum(noise / magnitude, _LEAST_NOISE)
+
+
 _HALVES_BEYOND_NOISE = 3.0
 _LEAST_CHANGE = 0.003
+_OF_A_MEDIAN = 1.25  # its standard error over that of a mean
 
 
 def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Floats) -> str:
@@ -522,7 +690,7 @@ def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Fl
     if not valid.any():
         return ""
     typical = float(np.median(change[valid]))
-    by_noise = OF_A_MEDIAN * float(np.median(relative_noise[valid])) / np.sqrt(valid.sum())
+    by_noise = _OF_A_MEDIAN * float(np.median(relative_noise[valid])) / np.sqrt(valid.sum())
     if abs(typical) < max(_HALVES_BEYOND_NOISE * by_noise, _LEAST_CHANGE):
         return ""
     direction = "higher" if typical > 0 else "lower"
