@@ -38,8 +38,10 @@ def migrate(database: Database, folder: Path) -> None:
 
 def _begin(connection: Connection) -> None:
     """Create the newest tables, and note their version as Alembic does."""
-    metadata.create_all(connection)
-    connection.execute(text("CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)"))
+    metadata.create_all(connection, checkfirst=False)  # what is there already is not of this store
+    connection.execute(
+        text("CREATE TABLE IF NOT EXISTS alembic_version (version_num VARCHAR(32) NOT NULL PRIMARY KEY)")
+    )
     connection.execute(text("INSERT INTO alembic_version VALUES (:newest)"), {"newest": VERSIONS[-1]})
 
 

@@ -78,7 +78,7 @@ def completed(document: dict[str, Any]) -> dict[str, Any]:
             2,
         ),
         ("series", "skin.sensor_radius_mm, recording.indenter_radius_mm, recording.preload_n", 1),
-        ("headed", "skin.sensor_radius_mm, recording.indenter_radius_mm, skin.sensors", 1),
+        ("headed", "skin.sensor_radius_mm, recording.indenter_radius_mm", 1),
         ("merged", "recording.indenter_radius_mm, recording.dynamic_force_n, skin.sensors", 4),
         ("curve", "# To be completed: recording.indenter_radius_mm.", 1),
     ],

@@ -23,7 +23,7 @@ from underskin.units import Complexes, Floats
 
 pytestmark = pytest.mark.slow
 
-EXAMPLE = ROOT / "service" / "pages" / "start" / "example" / "2024-11.json"
+EXAMPLE = ROOT / "service" / "pages" / "example" / "2024-11.json"
 OF_LINES = beside("contact_resonance", "mains_pickup", "timing_delay", "amplifier_high_pass", "sensor_relaxation")
 DECLARED = beside("modulus_error", "thickness_error", "misalignment", "strain_stiffening", "interface_slip")
 

@@ -1,8 +1,9 @@
 """Campaigns of one skin in parts: files that hold a sensor, a press or a preload each are one campaign together.
 
 Two campaigns tell a change over time by the sensors that both record. Parts of one day, or without dates, are put
-together where no sensor is recorded twice under the same conditions; campaigns of any days where they share no sensor;
-and either where one of them has too few recordings for a diagnosis. They are joined as `recordings.reading.join` does.
+together where no sensor is recorded twice under the same conditions, or where one of them has too few recordings for a
+diagnosis; campaigns of any days where they share no sensor. Parts that state different skins stay apart. They are
+joined as `recordings.reading.join` does.
 """
 
 from collections.abc import Callable, Sequence
@@ -42,13 +43,26 @@ def _put_together(groups: Sequence[_Parts], are_apart: Callable[[_Parts, _Parts]
     """The groups, each with the first in this order of those before it that it complements."""
     sessions: list[_Parts] = []
     for group in groups:
-        complemented = (one for one in sessions[order] if _is_too_few(one, group) or not are_apart(one, group))
+        complemented = (
+            one
+            for one in sessions[order]
+            if not _are_of_different_skins(one, group)
+            and (not are_apart(one, group) or (_is_too_few(one, group) and not _are_of_different_days(one, group)))
+        )
         session = next(complemented, None)
         if session is None:
             sessions.append(list(group))
         else:
             session += group
     return sessions
+
+
+def _are_of_different_skins(first: _Parts, second: _Parts) -> bool:
+    return len({part.skin.id for part in (*first, *second)} - {None}) > 1
+
+
+def _are_of_different_days(first: _Parts, second: _Parts) -> bool:
+    return len({first_date(part) for part in (*first, *second)} - {None}) > 1
 
 
 def _is_too_few(first: _Parts, second: _Parts) -> bool:
@@ -64,8 +78,10 @@ def _share_sensor(first: _Parts, second: _Parts) -> bool:
 
 
 def _repeat(first: _Parts, second: _Parts) -> bool:
-    """Whether a sensor is recorded in both under the same conditions."""
+    """Whether a sensor is recorded in both on different days, or under the same conditions."""
     shared = {entry.sensor for entry in _recordings(first)} & {entry.sensor for entry in _recordings(second)}
+    if shared and _are_of_different_days(first, second):
+        return True
     for sensor in shared:
         conditions, others = _conditions(first, sensor), _conditions(second, sensor)
         if (np.abs(conditions[:, None] - others) < _SAME).all(axis=2).any():

@@ -32,7 +32,6 @@ _SI_WORDS: Mapping[str, str] = {
     "A": "amps ampere amperes ampère ampères amperio amperios ампер",
 }
 _PREFIX_WORDS: Mapping[float, str] = {
-    1e-18: "atto",
     1e-15: "femto",
     1e-12: "pico piko пико п 皮",
     1e-9: "nano нано н 纳",
@@ -47,7 +46,7 @@ _OTHERS: Mapping[tuple[str, float], str] = {
     ("force", POUND_FORCE): "lb lbs lbf lbsf lb-f pound pounds pound-force pounds-force pfund libra libras livre "
     "livres",
     ("force", POUND_FORCE / 16): "oz ozf ounce ounces",
-    ("force", 1e-5): "dyne dynes dyn",
+    ("force", 1e-5): "dyne dynes",
     ("force", STANDARD_GRAVITY): "kg kgf kp kilopond kilogram kilograms kilogram-force kilogramm",
     ("force", GRAM_FORCE): "gf gram grams gramm gram-force pond",
     ("length", _INCH): "in inch inches zoll pouce pouces pulgada pulgadas pollice pollici",
@@ -81,12 +80,11 @@ DECIBEL = "decibel"  # the dimension of a logarithm, which no field has
 
 
 _PREFIXES = {
-    "": 1.0, "a": 1e-18, "f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2,
-    "d": 1e-1, "da": 1e1, "h": 1e2, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12,
+    "": 1.0, "f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1,
+    "da": 1e1, "h": 1e2, "k": 1e3, "M": 1e6, "G": 1e9,
 }  # fmt: skip
-_ELECTRIC, _MECHANICAL = ("C", "V", "A", "N"), ("N", "Pa", "m")
-# Prefixes of some units alone: "fs" is a sampling rate, and "as" and "am" are words
-_ONLY_OF = {"a": _ELECTRIC, "f": _ELECTRIC, **dict.fromkeys(("c", "d", "da", "h"), _MECHANICAL), "T": ("Pa", "Hz")}
+# Prefixes of some units alone: "fs" is a sampling rate, and "aC" a coupling
+_ONLY_OF = {"f": ("C",), "c": ("N", "m"), "d": ("N", "m"), "da": ("N",), "h": ("Pa",)}
 _BASES = {
     "m": "length",
     "N": "force",
