@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth.access_control import OPEN, AccessControl, goes_to_disk
@@ -123,7 +123,7 @@ class AsgiMiddleware:
         if scope.get(OVERLOADED) and path not in OPEN:
             busy = "Too many connections are open (UNDERSKIN_MAX_CONNECTIONS); try again in a while."
             raise Refusal(503, busy, headers={**RETRY_LATER, "Connection": "close"})
-        if sum(name == b"host" for name, _ in scope["headers"]) > 1:  # a proxy may have checked the other one
+        if [name for name, _ in scope["headers"]].count(b"host") > 1:  # a proxy may have checked the other one
             raise Refusal(400, "The request has several Host headers; it must have one.")
         scope["key"] = self._access.check(method, path, headers, scope["query_string"])
         with self._held.one() as hold:
@@ -143,10 +143,16 @@ class AsgiMiddleware:
         if hot is None or not _plain(method, headers):
             await self._api(scope, receive, exchange.send)
             return
-        body = b"" if method == "GET" else await Request(scope, receive).body()
-        content = hot(body or scope["query_string"]) if len(body) <= _MOST_HOT_BYTES else None
+        if method == "POST":
+            message = await receive()
+            sent = message.get("body", b"")
+            is_short = not message.get("more_body", False) and len(sent) <= _MOST_HOT_BYTES
+            receive = _replay(message, receive)
+        else:
+            sent, is_short = scope["query_string"], True
+        content = hot(sent) if is_short else None
         if content is None:
-            await self._api(scope, _replay(body, receive), exchange.send)
+            await self._api(scope, receive, exchange.send)
         else:
             await exchange.answer(content)
 
@@ -200,15 +206,15 @@ def _plain(method: str, headers: Mapping[bytes, bytes]) -> bool:
     return method == "GET" or headers.get(b"content-type", b"").split(b";")[0].strip().lower() == b"application/json"
 
 
-def _replay(body: bytes, receive: Receive) -> Receive:
-    """A body that was read already, followed by the remaining messages."""
+def _replay(message: Message, receive: Receive) -> Receive:
+    """A message that was received already, followed by the remaining ones."""
     pending = True
 
     async def replayed() -> Message:
         nonlocal pending
         if pending:
             pending = False
-            return {"type": "http.request", "body": body, "more_body": False}
+            return message
         return await receive()
 
     return replayed

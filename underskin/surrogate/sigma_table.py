@@ -11,6 +11,7 @@ The splines are tensor products of cubic ones through values on a grid (not-a-kn
 import math
 import sys
 from abc import ABC, abstractmethod
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -63,6 +64,21 @@ class CubicAxis:
         self.limits = [nodes[0], nodes[-1], scale]
         parts = ((nodes - nodes[0]) * scale).astype(np.int64)
         self.buckets = np.searchsorted(parts[1:-1], np.arange(parts[-1] + 1))
+
+    def functions(self, x: float) -> tuple[int, int, list[float]]:
+        """The cell that holds x, which lies within the nodes, the first of the four functions there, their values."""
+        inner, cells = self._floats
+        cell = bisect_right(inner, x)
+        first, lower, cubics = cells[cell]
+        u = x - lower
+        return cell, first, [c0 + u * (c1 + u * (c2 + u * c3)) for c0, c1, c2, c3 in cubics]
+
+    @cached_property
+    def _floats(self) -> tuple[list[float], list[tuple[int, float, list[list[float]]]]]:
+        """The inner nodes; of each cell the first function, its lower end, its cubics (functions, powers)."""
+        cubics = self.cubics.swapaxes(1, 2).tolist()
+        cells = list(zip(self.first.tolist(), self.lower.tolist(), cubics, strict=True))
+        return self.nodes[1:-1].tolist(), cells
 
     def coefficients(self, values: Floats, axis: int) -> Floats:
         """The spline's coefficients, along one axis of the values.
@@ -141,21 +157,18 @@ class TensorSpline:
     def at_point(self, *point: float) -> tuple[float, tuple[int, ...]]:
         """The value at one point and the cells that hold it; NaN outside the nodes.
 
-        Without compiled code, which takes half a second to load, and in the order of `spline_kernel.sigma_rows`: the
-        bits are the same.
+        In plain floats, faster for one point than arrays and without compiled code, which takes half a second to load;
+        in the order of `spline_kernel.sigma_rows`, so that the bits are the same.
         """
         if not all(axis.nodes[0] <= x <= axis.nodes[-1] for axis, x in zip(self.axes, point, strict=True)):
             return math.nan, (0,) * len(point)
-        cells = [int(np.searchsorted(axis.nodes[1:-1], x, "right")) for axis, x in zip(self.axes, point, strict=True)]
-        value = self.coefficients[(0,) * (4 - len(point))]
-        for number, (axis, cell) in enumerate(zip(self.axes, cells, strict=True)):
-            low = int(axis.first[cell])
-            value = np.take(value, range(low, low + _DEGREE + 1), axis=number)
-        for axis, cell, x in reversed([*zip(self.axes, cells, point, strict=True)]):
-            u, (c0, c1, c2, c3) = x - axis.lower[cell], axis.cubics[cell]
-            terms = value * (c0 + u * (c1 + u * (c2 + u * c3)))
-            value = terms[..., 0] + terms[..., 1] + terms[..., 2] + terms[..., 3]
-        return float(value), tuple(cells)
+        cells, firsts, weights = zip(*map(CubicAxis.functions, self.axes, point), strict=True)
+        within = self.coefficients[(0,) * (4 - len(point)) + tuple(slice(first, first + 4) for first in firsts)]
+        values = within.ravel().tolist()
+        for w0, w1, w2, w3 in reversed(weights):
+            fours = zip(values[::4], values[1::4], values[2::4], values[3::4], strict=True)
+            values = [v0 * w0 + v1 * w1 + v2 * w2 + v3 * w3 for v0, v1, v2, v3 in fours]
+        return values[0], cells
 
     def at(self, *variables: Differentiated, chosen: Indices | None = None, end: float = math.inf) -> Differentiated:
         """Values (…, rows) at the variables (…, rows), one for each axis, with derivatives.
