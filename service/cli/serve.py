@@ -46,7 +46,6 @@ def serve(
             where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
             fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
-        table.at(0.0, 0.0)  # loads the compiled functions, for which no request then waits
         use_folder_of_lab(settings)
         CATALOGUE.load()  # errors of other packages' extensions end the start, not the first file or diagnosis
         formats_of_other_packages()

@@ -2,6 +2,7 @@
 readers."""
 
 from collections.abc import Sequence
+from functools import cache
 from html import escape
 from typing import Any
 
@@ -30,30 +31,34 @@ _AXIS = {
     **PLAIN,
     # No automargin: it makes the browser draw everything again, three times as long.
 }
-_TEMPLATE = go.layout.Template(
-    data={"heatmap": [{"colorbar": PLAIN}], "scatter": [{"marker": {"colorbar": PLAIN}}]},
-    layout={
-        "font": {
-            "family": "system-ui, -apple-system, Segoe UI, Helvetica, Arial, sans-serif",
-            "size": 13,
-            "color": INK,
-        },
-        "paper_bgcolor": "#ffffff",
-        "plot_bgcolor": "#ffffff",
-        "colorway": list(COLOURS),
-        "hoverlabel": {"font": {"size": 13}},
-        "xaxis": _AXIS,
-        "yaxis": _AXIS,
-        "margin": {"l": 70, "r": 20, "t": 50, "b": 55},
-        "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
-        "title": {"font": {"size": 16}, "x": 0},
-    },
-)
 
 
 def styled(figure: go.Figure, title: str, height: int = 420) -> go.Figure:
     """The figure with its title in the common style; `height` in pixels."""
-    return figure.update_layout(template=_TEMPLATE, title=title, height=height)
+    return figure.update_layout(template=_template(), title=title, height=height)
+
+
+@cache  # made where a figure is drawn: it takes longer than to import this module
+def _template() -> go.layout.Template:
+    return go.layout.Template(
+        data={"heatmap": [{"colorbar": PLAIN}], "scatter": [{"marker": {"colorbar": PLAIN}}]},
+        layout={
+            "font": {
+                "family": "system-ui, -apple-system, Segoe UI, Helvetica, Arial, sans-serif",
+                "size": 13,
+                "color": INK,
+            },
+            "paper_bgcolor": "#ffffff",
+            "plot_bgcolor": "#ffffff",
+            "colorway": list(COLOURS),
+            "hoverlabel": {"font": {"size": 13}},
+            "xaxis": _AXIS,
+            "yaxis": _AXIS,
+            "margin": {"l": 70, "r": 20, "t": 50, "b": 55},
+            "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
+            "title": {"font": {"size": 16}, "x": 0},
+        },
+    )
 
 
 def line_style(number: int, width: float) -> dict[str, Any]:

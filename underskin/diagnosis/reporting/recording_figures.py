@@ -10,6 +10,7 @@ measured; orange, dashed and square the model before; blue, solid and circle the
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from html import escape
 from typing import Any, NamedTuple
 
@@ -37,10 +38,6 @@ from underskin.inversion.mixed_model import SDS_OF_95
 from underskin.mechanisms.base import Parameter
 from underskin.units import Floats, readable_unit
 
-_TEMPLATE = go.layout.Template(pio.templates["plotly_white"]).update(
-    layout={"xaxis": PLAIN, "yaxis": PLAIN}, data={"heatmap": [{"colorbar": PLAIN}]}
-)
-_STYLE = {"template": _TEMPLATE, "font": {"size": 14, "color": "#222222"}}
 MEASURED, BEFORE, AFTER, BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.15)"
 BELOW = {"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"}  # a legend below the figure
 SMALL_TITLE = 12  # pixels: of a panel, so that those of two do not touch
@@ -51,7 +48,15 @@ PlotlyTrace = dict[str, Any]
 
 def styled(figure: go.Figure) -> go.Figure:
     """The figure in the common layout."""
-    return figure.update_layout(**_STYLE)
+    return figure.update_layout(**_style())
+
+
+@cache  # made where a figure is drawn: it takes longer than to import this module
+def _style() -> dict[str, Any]:
+    template = go.layout.Template(pio.templates["plotly_white"]).update(
+        layout={"xaxis": PLAIN, "yaxis": PLAIN}, data={"heatmap": [{"colorbar": PLAIN}]}
+    )
+    return {"template": template, "font": {"size": 14, "color": "#222222"}}
 
 
 class Model(NamedTuple):
@@ -110,7 +115,7 @@ def curve_figure(curves: Sequence[ShownCurve], traits: KindTraits, before: str, 
     visible = [[other is drawing for other in drawings for _ in other.traces] for drawing in drawings]
     figure.update_layout(
         title=traits.title,
-        **_STYLE,
+        **_style(),
         height=height,
         margin={"r": 20, "t": 80, "b": 130},
         legend={**BELOW, "tracegroupgap": 0},
@@ -279,7 +284,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
         figure.layout[path] = value
     figure.update_layout(
         title="Measured and predicted, recording by recording",
-        **_STYLE,
+        **_style(),
         height=_HEIGHT,
         margin={"l": 90, "r": 20, "t": 80, "b": 100},
         legend=BELOW,

@@ -16,7 +16,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy.special import gamma
 
 from underskin.autodiff import Differentiated, contiguous
-from underskin.mechanisms.models.sphere_kernels import memory_rows
 from underskin.units import Floats
 
 _POWER_STEP = float(np.log(4.0))  # of ln τ, as compiled functions take it: τ falls by a factor of 4 each
@@ -92,6 +91,8 @@ class Relaxation:
 def memories(history: Floats, time: Floats, relaxation: Relaxation) -> Floats:
     """Y (points, curves, samples, pairs) of histories u (points, curves, samples) at times [s]; u at the first
     sample is a step."""
+    from underskin.mechanisms.models.sphere_kernels import memory_rows
+
     pairs = relaxation.of_points(len(history))
     memory = np.empty((*history.shape, pairs[0].shape[-1]))
     memory_rows(contiguous(history), contiguous(np.broadcast_to(time, history.shape)), *pairs, memory)

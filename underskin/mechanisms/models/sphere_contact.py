@@ -47,14 +47,6 @@ from scipy.interpolate import CubicSpline
 
 from underskin.autodiff import contiguous
 from underskin.mechanisms.models.curve_state import Relaxation, memories
-from underskin.mechanisms.models.sphere_kernels import (
-    contact_rows,
-    creep_edge_rows,
-    edge_rows,
-    pull_off_rows,
-    radius_rows,
-    ring_rows,
-)
 from underskin.physics.elastic_layer import LARGEST_A_OVER_H, Layer, curves_of
 from underskin.surrogate.hdf5_format import load_contact
 from underskin.units import Floats, Indices, Mask
@@ -146,6 +138,8 @@ class Sphere:
 
     def at(self, a: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """F, δ and K without adhesion at radii a, and ℓ/√w of the adhesive stretch."""
+        from underskin.mechanisms.models.sphere_kernels import contact_rows
+
         shape = np.broadcast_shapes(np.shape(a), self._body.shape[:-1])
         contact = np.empty((4, *shape))
         contact_rows(_wide(a, shape), self._wide_body(shape), self._cubics, contact)
@@ -166,6 +160,8 @@ class Sphere:
 
     def radius_at(self, travel: Floats, work: Floats | None, least: Floats | float = 0.0) -> Floats:
         """The radius of the stable contact at a travel in equilibrium; without one `least`, the radius at pull-off."""
+        from underskin.mechanisms.models.sphere_kernels import radius_rows
+
         depth = np.maximum(travel, _SMALLEST)
         root = np.sqrt(self.radius * depth)
         start = root if self.layers is None else self.layers.radius_of(root)
@@ -183,6 +179,8 @@ class Sphere:
 
     def pull_off(self, work: Floats | None) -> tuple[Floats, Floats]:
         """The radius and travel (points, curves, 1) below which there is no stable contact; 0 without adhesion."""
+        from underskin.mechanisms.models.sphere_kernels import pull_off_rows
+
         shape = self._body.shape[:-1]
         if work is None:
             return np.zeros(shape), np.zeros(shape)
@@ -246,6 +244,8 @@ def edges(sphere: Sphere, travel: Floats, contact_mask: Mask, work: Floats, sepa
     The edge advances where its energy release rate is the `work` of adhesion, recedes where it is that of
     `separation`, and rests in between.
     """
+    from underskin.mechanisms.models.sphere_kernels import edge_rows
+
     receding_work = work if separation is None else separation
     least, _ = sphere.pull_off(receding_work)
     if separation is None:
@@ -293,6 +293,8 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
 
     The compliance of the sphere's stage is ignored.
     """
+    from underskin.mechanisms.models.sphere_kernels import creep_edge_rows
+
     if np.any(sphere.compliance):
         sphere = replace(sphere, compliance=0.0)
     if path.again.all():
@@ -362,6 +364,8 @@ def _relaxing_again(
     sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, path: Path
 ) -> tuple[Floats, Mask]:
     """As `relaxing`, of spheres that press again."""
+    from underskin.mechanisms.models.sphere_kernels import ring_rows
+
     depth = np.where(path.touched, path.travel, 0.0)
     reach = np.maximum(depth.max(axis=-1, keepdims=True), _SMALLEST) * np.linspace(0.0, 1.0, _RINGS + 1) ** 2
     slope = np.diff(_elastic(sphere, sphere.radius_at(reach, None), None)[0]) / np.diff(reach)
