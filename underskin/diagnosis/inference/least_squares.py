@@ -8,6 +8,7 @@ between the samples where it fits best.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -25,6 +26,9 @@ _STEP = 1e-3  # of that, the tolerance on steps: a contact point's prior is far 
 _PASSED = 4  # most samples, either way, that a contact point is moved past
 _OFF_SAMPLE = 1e-6  # of the gap between two samples: a contact point at a sample is past it
 _ROUNDING = 1e-9  # of a range: smaller differences are rounding, and a start is so far off its bounds
+
+
+Linearised = tuple[Floats, Floats]  # residuals (rows,) and their derivatives (rows, coordinates)
 
 
 class LeastSquares:
@@ -92,24 +96,19 @@ class LeastSquares:
         initial = np.append(np.clip(start[:count], low + margin, high - margin), start[count:])
         bounds = np.append(low, -gains), np.append(high, gains)
         unit = np.append(_units(self._model, self._precision), np.ones(len(gains)))
-        return _solved(self._residuals, self._jacobian, initial, bounds, unit, _OF_STARTS)
+        return _solved(self._linearised, initial, bounds, unit, _OF_STARTS)
 
-    def _residuals(self, x: Floats) -> Floats:
-        count = len(self._low)
-        fit, gain = x[:count], x[count:]
-        force = self._model.forces(fit[None])[0]
-        residuals = (self._measured - (1 + gain[self._recording]) * force) / self._unit
-        return np.concatenate([self._projected(residuals), (fit - self._centre) * self._precision, gain / START_GAIN])
-
-    def _jacobian(self, x: Floats) -> Floats:
+    def _linearised(self, x: Floats) -> Linearised:
         count = len(self._low)
         fit, gain = x[:count], x[count:]
         force, slopes = (part[0] for part in self._model.forces_and_slopes(fit[None]))
-        by_fit = -(slopes * (1 + gain[self._recording])) / self._unit
+        scaled = 1 + gain[self._recording]
+        residuals = self._projected((self._measured - scaled * force) / self._unit)
         by_gain = np.where(self._recording == np.arange(len(gain))[:, None], -force / self._unit, 0.0)
-        rows = np.concatenate([self._projected(by_fit), self._projected(by_gain)]).T
+        rows = np.concatenate([self._projected(-(slopes * scaled) / self._unit), self._projected(by_gain)]).T
         priors = np.diag(np.append(self._precision, np.full(len(gain), 1 / START_GAIN)))
-        return np.concatenate([rows, priors])
+        offsets = (fit - self._centre) * self._precision, gain / START_GAIN
+        return np.concatenate([residuals, *offsets]), np.concatenate([rows, priors])
 
     def _projected(self, rows: Floats) -> Floats:
         """Rows (…, rows) minus their projection on zero and drift of each cell, and the coefficients of these."""
@@ -148,18 +147,16 @@ def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, 
             [part - part @ basis @ basis.T for part, basis in zip(parts, bases, strict=True)], axis=-1
         )
 
-    def residuals(x: Floats) -> Floats:
-        return about_zero(measured - model.forces(x[None])[0]) / unit
-
-    def jacobian(x: Floats) -> Floats:
-        return -about_zero(model.forces_and_slopes(x[None])[1][0]).T / unit
+    def linearised(x: Floats) -> Linearised:
+        force, slopes = (part[0] for part in model.forces_and_slopes(x[None]))
+        return about_zero(measured - force) / unit, -about_zero(slopes).T / unit
 
     unit = float(np.sqrt((about_zero(measured) ** 2).sum()))
     low, high = np.array([parameter.bounds for parameter in model.parameters]).T
     margin = _ROUNDING * (high - low)
     initial = np.clip(start, low + margin, high - margin)
     precision = np.sqrt([curvature_of_prior(parameter)[0] for parameter in model.parameters])
-    best, cost = _solved(residuals, jacobian, initial, (low, high), _units(model, precision), _TOLERANCE)
+    best, cost = _solved(linearised, initial, (low, high), _units(model, precision), _TOLERANCE)
     square_sum = 2 * cost * unit**2 + lines.smooth.within(model.forces(best[None])[0], lines.spans)
     return best, 100 * float(np.sqrt(square_sum / (count * measured**2).sum()))
 
@@ -195,8 +192,7 @@ def _units(model: CurveModel, precision: Floats) -> Floats:
 
 
 def _solved(
-    residuals: Callable[[Floats], Floats],
-    jacobian: Callable[[Floats], Floats],
+    linearised: Callable[[Floats], Linearised],
     start: Floats,
     bounds: tuple[Floats, Floats],
     unit: Floats,
@@ -205,15 +201,20 @@ def _solved(
     """The solution and half the sum of squares there.
 
     Coordinates are shifted to the start and scaled by `unit`, so that the tolerance on steps does not depend on the
-    zero of the displacement.
+    zero of the displacement. Residuals are followed by their derivatives at the same point, of which one prediction is
+    enough.
     """
     low, high = bounds
 
+    @lru_cache(maxsize=1)
+    def at(moved: bytes) -> Linearised:
+        return linearised(start + unit * (np.frombuffer(moved) - 1))
+
     def residuals_at(moved: Floats) -> Floats:
-        return residuals(start + unit * (moved - 1))
+        return at(moved.tobytes())[0]
 
     def jacobian_at(moved: Floats) -> Floats:
-        return jacobian(start + unit * (moved - 1)) * unit
+        return at(moved.tobytes())[1] * unit
 
     lowest, highest = 1 + (low - start) / unit, 1 + (high - start) / unit
     result = least_squares(
