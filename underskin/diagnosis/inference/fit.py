@@ -28,7 +28,7 @@ from underskin.diagnosis.inference.products import FrfProducts, Products
 from underskin.diagnosis.noise import DISCREPANCY, GAIN_PRIOR, START_GAIN, USUAL, SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.units import Floats, Indices, Mask
+from underskin.units import Floats, Mask
 
 _FREE_SPREAD = 0.02  # above this sd of b, e^b is linearised at the most probable b, not at 0
 _NUMBERS_AT_ONCE = 1_000_000
@@ -442,14 +442,14 @@ class Fitter:
             if resting.any():
                 settled = self.update_noise_levels(part[resting], settling)
                 going[resting] = part.cost[resting] - settled.cost >= _CONVERGED
-                best = self.replaced(best, moving[resting], settled)
+                best = best.replaced(moving[resting], settled)
             stepping = ~resting
             if stepping.any():
                 number = moving[stepping]
                 after, damping[number], going[stepping] = self._after_step(
                     part[stepping], step[stepping], damping[number], settling
                 )
-                best = self.replaced(best, number, after)
+                best = best.replaced(number, after)
             moving = moving[going]
             if not len(moving):
                 break
@@ -463,23 +463,14 @@ class Fitter:
         tried = self.update_noise_levels(self.evaluate(replace(at.points, fit=fit)), settling)
         gained = at.cost - tried.cost
         better = gained > 0
-        after = self.replaced(at, np.flatnonzero(better), tried[better])
+        gaining = np.flatnonzero(better)
+        after = at.replaced(gaining, tried.subset(gaining))
         stuck = ~better & ((damping > 1e4) | (np.abs(step).max(axis=1) < 1e-7))
         failed = ~better & ~stuck
         damping = np.where(better, np.maximum(damping / 10, 1e-6), damping)
         damping = np.where(failed, np.maximum(damping * 10, 1e-2), damping)
         idle = failed & (gained > -_CONVERGED) & (damping > 1)
         return after, damping, ~(stuck | idle | (better & (gained < _CONVERGED)))
-
-    def replaced(self, at: Evaluated, where: Indices, other: Evaluated) -> Evaluated:
-        """With other points in place of those at indices `where`, in rising order."""
-        if not len(where):
-            return at
-        if len(where) == len(at):
-            return other
-        order = np.arange(len(at))
-        order[where] = len(at) + np.arange(len(other))
-        return Evaluated.joined([at, other])[order]
 
     def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats, Floats]:
         """Damped Gauss–Newton steps of the mean parameters within the bounds, limited in length, and the gains that the

@@ -62,6 +62,22 @@ class AtPoints:
         """At some of the points."""
         return replace(self, **{name: value[points] for name, value in self._by_points().items()})
 
+    def replaced(self, points: Indices, other: Self) -> Self:
+        """With `other` at some of the points, in rising order."""
+        values = self._by_points()
+        if not len(points):
+            return self
+        if len(points) == len(next(iter(values.values()))):
+            return other
+        for name, value in values.items():
+            new = getattr(other, name)
+            if isinstance(value, AtPoints):
+                values[name] = value.replaced(points, new)
+            else:
+                values[name] = value.copy()
+                values[name][points] = new
+        return replace(self, **values)
+
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """At the points of several, one after another."""
