@@ -34,6 +34,9 @@ CONTACT_SCHEMA = "underskin-contact/3"
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
+_LARGEST_CBRT_LOAD = 0.222 ** (1 / 3)  # to which the contact table is continued
+
+
 @dataclass(frozen=True)
 class Dataset:
     """One dataset of a table: its values, the names of its axes (empty for an axis itself) and its meaning."""
@@ -201,7 +204,11 @@ _FURTHER = {"second_over_first": "yeoh", "poisson_ratio": "compressible", "frict
 
 
 class ContactTable(Table):
-    """A verified table of the corrections.
+    """A verified table of the corrections, continued by their splines from the largest solved load to L = 0.222, which
+    on a half space is a/R = 0.5.
+
+    Of 23 fresh solves at L from 0.15 to 0.256 the continuation errs by at most 0.05 % of σ and 0.3 % of its increment
+    (`tests/surrogate/test_contact_table.py`).
 
     Attributes
     ----------
@@ -217,20 +224,23 @@ class ContactTable(Table):
 
     def _take(self, data: Mapping[str, Floats]) -> None:
         state = {name.partition("/")[2]: values for name, values in data.items() if name.startswith(f"{_STATE}/")}
-        self.axes = state["a_over_h"], state["cbrt_load_parameter"], state["r_over_h"]
-        self.correction_error = state["correction_error"]
-        self.contact_radius, self.indentation = state["contact_radius"], state["indentation"]
-        self.stiffness = state["stiffness"]
-        x = self.axes[1][1:, None]
-        coefficients = np.linalg.lstsq(x ** np.array([1.0, 2.0, 3.0]), self.indentation[:, 1:].T - 1, rcond=None)[0]
-        self._softening = CubicSpline(self.axes[0], coefficients.T)
-        self._over_radius = make_interp_spline(self.axes[2], state["correction"], k=3, axis=2)
+        a, x, r = state["a_over_h"], state["cbrt_load_parameter"], state["r_over_h"]
+        self.axes = a, np.append(x, _LARGEST_CBRT_LOAD), r
+        ratios = (_continued(x, state[name], 1) for name in ("contact_radius", "indentation", "stiffness"))
+        self.contact_radius, self.indentation, self.stiffness = ratios
+        correction = _continued(x, state["correction"], 1)
+        # What the last node moves there is more than what a further one would
+        unsure = np.abs(correction[:, -1] - _continued(x[:-1], state["correction"][:, :-1], 1)[:, -1])
+        last = state["correction_error"][:, -1] + unsure
+        self.correction_error = np.concatenate([state["correction_error"], last[:, None]], axis=1)
+        powers = x[1:, None] ** np.array([1.0, 2.0, 3.0])
+        coefficients = np.linalg.lstsq(powers, state["indentation"][:, 1:].T - 1, rcond=None)[0]
+        self._softening = CubicSpline(a, coefficients.T)
+        self._over_radius = make_interp_spline(r, correction, k=3, axis=2)
+        further = {name: (data[f"{group}/{name}"], data[f"{group}/correction"]) for name, group in _FURTHER.items()}
         self._further = {
-            name: (
-                data[f"{group}/{name}"],
-                make_interp_spline(self.axes[2], data[f"{group}/correction"], k=3, axis=3),
-            )
-            for name, group in _FURTHER.items()
+            name: (nodes, make_interp_spline(r, _continued(x, added, 2), k=3, axis=3))
+            for name, (nodes, added) in further.items()
         }
 
     @property
@@ -264,7 +274,8 @@ class ContactTable(Table):
     def softening_coefficients(self, a_over_h: Floats) -> Floats:
         """p0, p1 and p2 (…, 3) of δ/δ_linear − 1 = x (p0 + p1 x + p2 x²) at the same force, x = L^(1/3).
 
-        Within 2e-5 of the table at its nodes; wider contacts have the value of the last a/h.
+        Within 2e-5 of the table at its nodes, and 2e-4 of solves up to L = 0.23; wider contacts have the value of the
+        last a/h.
         """
         return np.asarray(self._softening(np.minimum(a_over_h, self.axes[0][-1])))
 
@@ -276,6 +287,12 @@ class ContactTable(Table):
         x = np.minimum(cbrt_load, self.axes[1][-1])
         p0, p1, p2 = np.moveaxis(self.softening_coefficients(a_over_h), -1, 0)
         return np.asarray(x * (p0 + x * (p1 - (FULL_SPHERE_OF_LOAD if full_sphere else 0.0) + x * p2)))
+
+
+def _continued(x: Floats, values: Floats, axis: int) -> Floats:
+    """Values at nodes x of L^(1/3), and their spline's at the largest one."""
+    end = make_interp_spline(x, values, k=3, axis=axis)(_LARGEST_CBRT_LOAD)
+    return np.concatenate([values, np.expand_dims(end, axis)], axis=axis)
 
 
 def load_contact(path: Path | None = None) -> ContactTable:

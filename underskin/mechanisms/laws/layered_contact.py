@@ -29,9 +29,9 @@ class LayeredContact(Mechanism):
     mechanism is present too."""
     assumptions = """linear, frictionless contact; to the stress under it the correction of the sphere's own
     finite-strain contact with a neo-Hookean layer of its ν is added (tables/contact.h5, within 0.5 % of σ up to L
-    0.15); under a glue line that yields or adhesion that correction stays the bonded layer's without adhesion. A
-    declared thickness makes it no guess: it stands beside the half space with equal odds. Under indentations on a skin
-    without a declared one, the layer's thickness is a parameter."""
+    0.222, of a half space a/R 0.5); under a glue line that yields or adhesion that correction stays the bonded layer's
+    without adhesion. A declared thickness makes it no guess: it stands beside the half space with equal odds. Under
+    indentations on a skin without a declared one, the layer's thickness is a parameter."""
     source = "Lebedev & Ufliand, J. Appl. Math. Mech. 22 (1958) 442; Dimitriadis et al., Biophys. J. 82 (2002) 2798."
     stage = Stage.CONTACT
     order = 10
