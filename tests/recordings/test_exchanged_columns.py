@@ -57,6 +57,15 @@ def test_exchanged_columns_of_a_curve_give_no_modulus(way: str, noise: float) ->
     assert right.result.modulus == pytest.approx(1.2e6, rel=0.1)
 
 
+@pytest.mark.parametrize("way", ["back", "held", "in"])
+def test_exchanged_columns_are_named_where_the_stage_is_noisier_than_the_cell(way: str) -> None:
+    """0.03 % of the travel and 0.01 % of the force; the travel in the air shows which is the stage."""
+    (found,) = elastomer.of_campaign(curve(way, 1e-4, exchanged=True))
+    assert isinstance(found.result, InvalidInput)
+    assert "look exchanged" in str(found.result)
+    assert not are_exchanged(curve(way, 1e-4, exchanged=False).curves[0])
+
+
 def test_a_diagnosis_names_exchanged_columns() -> None:
     report = diagnose(curve("back", 0.01, exchanged=True))
     assert report["verdict"] == "insufficient_data"

@@ -307,9 +307,11 @@ def are_exchanged(recording: CurveRecording) -> bool:
     if end < _LEAST_IN:
         return False
     travel, load = force[:end], displacement[:end]
+    stands = _stands_first(load, travel)
+    if recording.has_sphere and stands > 0 and _is_uniform(travel):
+        return True  # whichever of the two is noisier
     if roughness(travel) / np.ptp(travel) > roughness(load) / max(np.ptp(load), 1e-300):
         return False
-    stands = _stands_first(load, travel)
     if recording.has_sphere:
         return stands > 0 or _follows(load, travel)
     return stands > 0 and _lags(load[stands:], travel[stands:])
@@ -347,11 +349,16 @@ def _are_alike(first: float, second: float) -> bool:
     return bool(first * second > 0 and 1 / _STEADY < first / second < _STEADY)
 
 
-def _follows(load: Floats, travel: Floats) -> bool:
-    """Whether `travel` has constant speed and `load` lags behind it like the force on a sphere."""
+def _is_uniform(travel: Floats) -> bool:
+    """Whether `travel` has constant speed."""
     samples = np.arange(len(travel))
     line = np.polyval(np.polyfit(samples, travel, 1), samples)
-    if np.abs(travel - line).max() > _UNIFORM * np.ptp(travel):
+    return bool(np.abs(travel - line).max() <= _UNIFORM * np.ptp(travel))
+
+
+def _follows(load: Floats, travel: Floats) -> bool:
+    """Whether `travel` has constant speed and `load` lags behind it like the force on a sphere."""
+    if not _is_uniform(travel):
         return False
     few = max(len(load) // _BLOCKS_IN, 1)
     start, half, end = (
