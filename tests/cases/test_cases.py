@@ -13,6 +13,7 @@ CASES = os.environ.get("UNDERSKIN_CASES")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(CASES is None, reason="UNDERSKIN_CASES names no folder of cases"),
+    pytest.mark.usefixtures("understood_here"),
 ]
 
 

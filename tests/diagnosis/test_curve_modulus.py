@@ -11,7 +11,7 @@ from rig.description import parse as experiment
 from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves, record_curves
-from tests.support.lean_reports import beside, lean_report
+from tests.support.lean_reports import beside, lean_report, quick_diagnosis
 from underskin import SkinDescription
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, parse
 from underskin.surrogate.sigma_table import SigmaTable
@@ -119,7 +119,7 @@ def on_frame(stiffness: float, noise: float, *heights: float, largest: float = 0
         force = pi / 4 * 10.0**2 * ((1 - strain) ** -2 - (1 - strain))
         force += noise * force.max() * np.random.default_rng(number).normal(size=len(force))
         blocks.append(CompressionRecording(f"b{number}", height, 10.0, height * strain + force / stiffness, force))
-    report = underskin.diagnose(Campaign("frame", SkinDescription(poisson_ratio=0.5), tuple(blocks)))
+    report = quick_diagnosis(Campaign("frame", SkinDescription(poisson_ratio=0.5), tuple(blocks)))
     assert report.fit is not None
     modulus = report.fit.after.youngs_modulus
     assert modulus is not None

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.soak import SOAK
 from tests.inversion.inverted_campaigns import covered
 from tests.support.campaign_documents import FRF, document
 from tests.support.instrument_files import hdf5
@@ -31,7 +32,7 @@ def test_a_skin_within_its_tolerances_is_covered(table: SigmaTable) -> None:
     assert skin.thickness_mm
     assert skin.sensor_radius_mm
     assert skin.youngs_modulus_mpa
-    for _ in range(60):
+    for _ in range(200 if SOAK else 30):
         off = np.exp(np.array([0.02, 0.02, 0.1]) * random.normal(size=3))
         declared = replace(
             skin,

@@ -23,6 +23,7 @@ from underskin.recordings.modulus import (
     loading_branch,
 )
 from underskin.units import Floats, to_lab, to_si
+from underskin.weak_cache import cached_while_alive
 
 # Largest departure from a law: of the range of stress of the part, of the stress there, and of the range of the curve
 _STRAIGHT, _LOCALLY, _LEAST = 0.012, 0.05, 2e-3
@@ -94,6 +95,7 @@ class CompressionModulus:
         return f"{follows}; leaves the {off} at {stress:.3g} MPa, {100 * self.leaves_at_strain:.3g} % from its foot"
 
 
+@cached_while_alive  # a diagnosis composes some dozen models of the same recordings
 def of_compression(recording: CompressionRecording) -> CompressionModulus:
     """The modulus of a `compression` recording."""
     return compression_modulus(

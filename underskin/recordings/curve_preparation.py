@@ -37,6 +37,7 @@ from underskin.recordings.curve_course import (
 from underskin.recordings.damaged_readings import force_step, marks, reading_steps, spikes, without_damaged
 from underskin.recordings.periodic_error import periodic_error
 from underskin.units import Floats, Indices, Mask
+from underskin.weak_cache import cached_while_alive
 
 FORCE, TRAVEL = "force_n", "displacement_mm"
 _LEAST_TELLING = 8  # samples needed to determine signs
@@ -474,6 +475,7 @@ class PreparedCurves:
     findings: tuple[Finding, ...]
 
 
+@cached_while_alive
 def prepared(campaign: Campaign) -> PreparedCurves:
     """The campaign with its curves prepared; other recordings are unchanged."""
     findings: list[Finding] = []

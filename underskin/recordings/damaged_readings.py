@@ -110,10 +110,11 @@ def force_step(travel: Floats, force: Floats, *, sphere: bool) -> int | None:
             continue
         around, steps = (np.delete(column[first:end], _AROUND) for column in (changed, moved))
         usual = float(np.median(around))
-        leaps = abs(changed[sample] - usual) > _APART * max(float(np.abs(around - usual).max()), noise)
+        if abs(changed[sample] - usual) <= _APART * max(float(np.abs(around - usual).max()), noise):
+            continue
         way_in, way_on = (np.median(np.diff(travel[part])) for part in (slice(first, sample), slice(sample - 1, end)))
         one_way = abs(travel[first:end][-1] - travel[first]) > _ONE_WAY * np.ptp(travel[first:end])
-        if leaps and one_way and way_in * way_on > 0 and moved[sample] <= 2 * np.median(steps):
+        if one_way and way_in * way_on > 0 and moved[sample] <= 2 * np.median(steps):
             return sample
     return None
 

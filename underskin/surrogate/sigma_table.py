@@ -14,7 +14,7 @@ from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -407,4 +407,11 @@ class SigmaTable(ContactModel, Table):
 
 def load_table(path: Path | None = None) -> SigmaTable:
     """The σ table at `path`, or the default one; raises TableError with the reason."""
-    return SigmaTable(path or tables_folder() / SIGMA_TABLE)
+    path = path or tables_folder() / SIGMA_TABLE
+    return _of_file(path, path.stat().st_mtime_ns if path.is_file() else 0)
+
+
+@lru_cache(maxsize=1)
+def _of_file(path: Path, _changed_ns: int) -> SigmaTable:
+    """A table, read once until its file changes: to read and verify it takes a quarter of a second."""
+    return SigmaTable(path)

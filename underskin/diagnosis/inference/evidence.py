@@ -35,6 +35,7 @@ from underskin.diagnosis.noise import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Floats
+from underskin.weak_cache import cached_while_alive
 
 _NEAR = 4.0  # standard deviations: bounds farther than this from the mean are left out
 # Largest numbers of polishing steps, of FRFs and of curves, and the gain in log posterior below which a point stops
@@ -46,7 +47,7 @@ NEGLIGIBLE_NATS = 12.0  # of log evidence behind the best: odds of 1 to 160,000,
 _LEAST_EIGENVALUE = 1e-11  # of correlations or their information: less is rounding
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """log Z up to a constant common to all hypotheses, the most probable point and the parameters' covariance there."""
 
@@ -324,7 +325,8 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, index: int) -> list
 _SMOOTH_STEPS = np.linspace(-3.0, 3.0, 7)  # standard deviations from the most probable logarithm of the smooth error
 
 
-def marginalise_curve_noise(evidence: Evidence, indices: Sequence[int]) -> NormalMixture:
+@cached_while_alive
+def marginalise_curve_noise(evidence: Evidence, indices: tuple[int, ...]) -> NormalMixture:
     """The posterior of the sum of parameters of a model of curves over all values of gain scatter and smooth error.
 
     Few curves leave the scatter of their gains open, and the most probable one is too small: together with a modulus

@@ -226,8 +226,8 @@ def modulus_over_answers(search: Search, problem: FittingProblem, shown: Explana
 def _log_modulus(problem: FittingProblem, explanation: Explanation) -> NormalMixture:
     """The logarithm of E [MPa]; the shares sum to 1."""
     spans, index = explanation.spans, explanation.index("youngs_modulus")
-    factor = [spans[MODULUS_ERROR].start] if MODULUS_ERROR in spans else []
-    mixture = marginalise_curve_noise(explanation.best, [index, *factor])
+    factor = (spans[MODULUS_ERROR].start,) if MODULUS_ERROR in spans else ()
+    mixture = marginalise_curve_noise(explanation.best, (index, *factor))
     mixture = mixture.averaged_over(law_levels(problem, explanation, _LAW_FACTORS))
     hiding = may_hide(problem.lines.campaign, problem.lines.mechanisms.named)
     hidden = hidden_factors(hiding, explanation.names)
