@@ -409,8 +409,6 @@ class FittingProblem:
 
     def _position_matters(self, fitter: Fitter, points: Points) -> bool:
         """Whether position scatter, as large as it usually gets, would show in some recording at one of the points."""
-        if self.lines.curves:
-            return False
         products = fitter.products(points, slopes=False, place=True)
         if products.squared_slopes is None:
             return False

@@ -360,7 +360,7 @@ def _law_clauses(facts: Facts, leading: LeadingLaw, document: Mapping[str, Any])
     acts_on, axis = law.description.acts_on, law.description.axis
     besides = f" besides {others}" if others else ""
     floor, held = facts.fit["noise_floor_percent"], document["heldout_rmse_percent"]
-    worth = _worth(held, floor, facts.traits.held_out, f" and {others}" if others else "")
+    worth = _worth(held, floor, facts.problem.lines.held_out, f" and {others}" if others else "")
     altered = _altered(leading, document)
     second = [f"what is missing{besides} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, altered]
     rivals = [

@@ -290,7 +290,7 @@ class Search:
     def _log_odds_of_discrepancy(self, fitted: Explanation) -> float:
         """Log odds that the smooth error beside a set is of a law that is missing, and not the idealisation of its own;
         −∞ of FRFs."""
-        if not fitted.best.hypothesis.lines.curves:
+        if fitted.best.hypothesis.lines.smooth is None:
             return -math.inf
         log_size = math.log(fitted.best.levels.smooth)
         beneath = self.log_prior_beneath(fitted) - self.log_prior(fitted)
