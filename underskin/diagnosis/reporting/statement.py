@@ -166,7 +166,7 @@ def _answer_clauses(facts: Facts, doubts: Sequence[str], *, all_used: bool, all_
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
     lead = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
-        total = in_percent(sum(answer.probability for answer in answers if answer.kind == leader.kind))
+        total = in_percent(sum(answer.probability for answer in answers if answer.outcome == leader.outcome))
         lead = f"known mechanisms explain this ({total} together), best {in_words(leader.names)} ({percent})"
     all_answers = f"in most of the remaining answers: {common}" if common else ""
     return [f"{lead}, but {', and '.join(but)}", all_answers, misfit, _law(mentioned)]

@@ -91,7 +91,7 @@ def curve_spread_findings(problem: FittingProblem, stated: Explanation, null: Ex
 def _moduli(problem: FittingProblem, explanation: Explanation) -> "_Moduli | None":
     """The moduli of the curves under a set of mechanisms; None of a single one, and where the model has no force."""
     lines, recordings = problem.lines, problem.lines.campaign.curves
-    if not lines.curves or len(recordings) < 2:
+    if len(recordings) < 2:
         return None
     noise = explanation.best.levels.level * lines.deviation
     measured, model = (column.real / noise for column in (lines.value, row_prediction(problem, explanation)))

@@ -69,7 +69,7 @@ class Adhesion(Mechanism):
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """From the least forces on both ways: -4πwR/3 at snap-in, -5πwR/6 to -3πwR/2 at pull-off."""
         measured = conditions.of(IndentationRecording)
-        if kind != "indentation" or not measured:
+        if not measured:
             return ()
         works = np.array([_works(recording) for recording in measured])
         snap_in, pull_off = np.clip(np.median(works, axis=0), _WORK.low, _WORK.high)

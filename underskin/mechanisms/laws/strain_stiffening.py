@@ -90,9 +90,7 @@ class StrainStiffening(Mechanism):
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """Of measured cylinders c2 and c3 by linear least squares at m = 2 and several α."""
         curves = conditions.of(CompressionRecording)
-        if kind != "compression" or not curves:
-            return ()
-        return [(*_polynomial(curves, alpha), 2.0, alpha) for alpha in _ALPHAS]
+        return [(*_polynomial(curves, alpha), 2.0, alpha) for alpha in _ALPHAS] if curves else ()
 
     def act(self, state: Contacts | Curve, values: Values) -> None:
         """Stiffen each contact by its own strain; a curve takes the law."""
