@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from underskin.diagnosis.inference.fit import Fitter, Scatter
-from underskin.diagnosis.inference.gaussian import NormalMixture
+from underskin.diagnosis.inference.gaussian import LEAST_EIGENVALUE, NormalMixture
 from underskin.diagnosis.inference.hypothesis import (
     FLAT,
     Evaluated,
@@ -37,13 +37,11 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Floats
 
 _NEAR = 4.0  # standard deviations: bounds farther than this from the mean are left out
-# Largest numbers of polishing steps, of FRFs and of curves, and the gain in log posterior below which a point stops
-_POLISHING_STEPS, _POLISHING_STEPS_OF_CURVES, _POLISHING_GAIN = 4, 12, 0.05
+_POLISHING_STEPS, _POLISHING_GAIN = 12, 0.05  # at most, and the gain in log posterior below which a point stops
 _LEAST_COVARIANCE_CURVATURE = 0.3  # in the logarithms of noise levels: their priors are not wider
 _REMAINING_GAIN = 1.0  # gain in log posterior that polishing may leave
 _LEAST_BOUNDS_TERM = -50.0  # nats: bounds around the point reduce an integral by less, and never raise it
 NEGLIGIBLE_NATS = 12.0  # of log evidence behind the best: odds of 1 to 160,000, which no other set makes up for
-_LEAST_EIGENVALUE = 1e-11  # of correlations or their information: less is rounding
 
 
 @dataclass(frozen=True)
@@ -133,7 +131,7 @@ class Evidence:
 
 def laplace_at(fitter: Fitter, at: Evaluated) -> Evidence:
     """Laplace's approximation at a most probable point, which is first polished until its whole gradient vanishes."""
-    for _ in range(_POLISHING_STEPS_OF_CURVES if fitter.lines.curves else _POLISHING_STEPS):
+    for _ in range(_POLISHING_STEPS):
         polished = _polished(fitter, at)
         if polished is None:
             break
@@ -179,9 +177,9 @@ def _definite(information: Floats) -> Floats:
     """The information with positive eigenvalues, which rounding may have made negative where it is nearly singular."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    if values[0] > _LEAST_EIGENVALUE:
+    if values[0] > LEAST_EIGENVALUE:
         return information
-    return np.asarray((vectors * np.maximum(values, _LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
+    return np.asarray((vectors * np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
 
 
 def level_integrals(fitter: Fitter, at: Evaluated) -> Floats:
