@@ -37,7 +37,8 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.units import Floats
 
 _NEAR = 4.0  # standard deviations: bounds farther than this from the mean are left out
-_POLISHING_STEPS, _POLISHING_GAIN = 12, 0.05  # at most, and the gain in log posterior below which a point stops
+# Largest numbers of polishing steps, of FRFs and of curves, and the gain in log posterior below which a point stops
+_POLISHING_STEPS, _POLISHING_STEPS_OF_CURVES, _POLISHING_GAIN = 4, 12, 0.05
 _LEAST_COVARIANCE_CURVATURE = 0.3  # in the logarithms of noise levels: their priors are not wider
 _REMAINING_GAIN = 1.0  # gain in log posterior that polishing may leave
 _LEAST_BOUNDS_TERM = -50.0  # nats: bounds around the point reduce an integral by less, and never raise it
@@ -131,7 +132,7 @@ class Evidence:
 
 def laplace_at(fitter: Fitter, at: Evaluated) -> Evidence:
     """Laplace's approximation at a most probable point, which is first polished until its whole gradient vanishes."""
-    for _ in range(_POLISHING_STEPS):
+    for _ in range(_POLISHING_STEPS_OF_CURVES if fitter.lines.curves else _POLISHING_STEPS):
         polished = _polished(fitter, at)
         if polished is None:
             break
