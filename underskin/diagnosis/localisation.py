@@ -246,10 +246,7 @@ def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator)
         [np.ones((1, lines.recordings)), random.choice([-1.0, 1.0], (PERMUTATIONS, lines.recordings))]
     )
     statistics = {}
-    parts = {"frequency_hz": residuals.line.real, "phase": residuals.line.imag}
-    if lines.curves:
-        parts = {"displacement_mm": residuals.line.real}
-    for name, part in parts.items():
+    for name, part in zip(lines.row_axes, (residuals.line.real, residuals.line.imag), strict=False):
         sums = np.zeros((lines.recordings, count))
         np.add.at(sums, (lines.recording, line), residuals.line_weight * part)
         statistics[name] = ((signs @ sums) ** 2 / total).sum(axis=1)

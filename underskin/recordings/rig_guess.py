@@ -8,7 +8,7 @@ called alike but for their first word (`s01 |H|`, `s01 phase`, `s02 |H|`, …) a
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Protocol
 
@@ -32,35 +32,58 @@ from underskin.recordings.readers.unit_labels import DECIBEL, decibel_reference,
 from underskin.recordings.rig_description import AXES, COMPLEX_FRF, MAGNITUDE, PHASE, SCHEMA, channel_fields
 
 _RATE = "sample_rate_hz"
-_BY_DIMENSION = {
-    "frf": {
-        "force": "force_n",
-        "charge": "charge_pc",
-        "frequency": "frequency_hz",
-        "charge/force": "frf_re_pc_per_n",
-        "time": "time_s",
-        "angle": PHASE,
-    },
-    "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
-    "compression": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
-}
 _MAGNITUDES = ("mag", "modulus", "|")  # as analysers call the absolute value of an FRF
 _OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
 _OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press with a spring call their channels
 _DEFLECTIONS = ("deflection", "cantilever", "durchbiegung")
-_OF_RECORDING = {
-    "frf": ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", _RATE, "load_cycles", "dwell_s"),
-    "indentation": ("sensor", "indenter_radius_mm", "stage_stiffness_n_per_mm"),
-    "compression": ("sample_height_mm", "sample_diameter_mm"),
-}
 _OPTIONAL_OF_SKIN = ("id", "width_mm", "length_mm")
 OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radius_mm")
+_D33 = "d33_pc_per_n"
 _ONE_SENSOR = {"id": "s01", "x_mm": 0, "y_mm": 0}
 _OF_ROWS = ("dynamic_force_n", "preload_n", "indenter_radius_mm")  # fields that may be columns
 _RADIUS = "radius"  # the derived channel
 _IMAGINARY = re.compile(r"imag|\bim\b")
 _QUOTED = re.compile(r"'([^']*)'")
 _FIRST_WORD = re.compile(r"(?P<first>[^\s_:]+)[\s_:]+(?P<rest>\S.*)")
+
+
+@dataclass(frozen=True)
+class _KindFields:
+    """The fields of one kind of recording.
+
+    `by_dimension`: the channel that a dimension suggests; `of_recording`: asked for, as are those `of_skin`;
+    `skin_by_words`: fields of the skin that any property may state, not only one of their own name; `is_on_sensors`:
+    whether it has a sensor and a position, and a table of it may hold fields of the recording in columns.
+    """
+
+    by_dimension: Mapping[str, str]
+    of_recording: tuple[str, ...]
+    of_skin: tuple[str, ...] = ("poisson_ratio",)
+    skin_by_words: tuple[str, ...] = ()  # of curves few: instruments report moduli
+    is_on_sensors: bool = False
+
+
+_OF_CURVES = {"force": "force_n", "length": "displacement_mm", "time": "time_s"}
+_OF_KIND = {
+    "frf": _KindFields(
+        {
+            "force": "force_n",
+            "charge": "charge_pc",
+            "frequency": "frequency_hz",
+            "charge/force": "frf_re_pc_per_n",
+            "time": "time_s",
+            "angle": PHASE,
+        },
+        ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", _RATE, "load_cycles", "dwell_s"),
+        of_skin=OF_SKIN,
+        skin_by_words=(*OF_SKIN, _D33),
+        is_on_sensors=True,
+    ),
+    "indentation": _KindFields(
+        _OF_CURVES, ("sensor", "indenter_radius_mm", "stage_stiffness_n_per_mm"), skin_by_words=("thickness_mm",)
+    ),
+    "compression": _KindFields(_OF_CURVES, ("sample_height_mm", "sample_diameter_mm")),
+}
 
 
 class Column(Protocol):
@@ -101,7 +124,7 @@ def of_contents(contents: Contents) -> dict[str, Any]:
     texts = dict.fromkeys(column.name for block in blocks for column in block.texts)
     dated = any(block.recorded_at is not None for block in contents.blocks)
     document = guessed(columns, contents.properties, {}, list(texts), dated=dated)
-    kind = document["kind"]
+    of_kind = _OF_KIND[document["kind"]]
     document = {**document, **_entries(columns, document)}
     document["recording"] = {
         name: source for name, source in document["recording"].items() if not _is_measured(source, blocks)
@@ -112,18 +135,17 @@ def of_contents(contents: Contents) -> dict[str, Any]:
     optional = ["stage_stiffness_n_per_mm", "load_cycles", "dwell_s"]
     optional += [_RATE] if rated or "force_n" not in document["channels"] else []
     optional += ["dynamic_force_n"] if "force_n" in document["channels"] else []
-    optional += ["sensor"] if kind == "indentation" or "recordings" in document else []
-    needed = [name for name in _OF_RECORDING[kind] if name not in optional]
-    skin = [name for name in OF_SKIN if kind == "frf" or name == "poisson_ratio"]
+    optional += ["sensor"] if not of_kind.is_on_sensors or "recordings" in document else []
+    needed = [name for name in of_kind.of_recording if name not in optional]
     sensors = _sensors(contents, document)
-    if kind == "frf" and not sensors:
+    if of_kind.is_on_sensors and not sensors:
         document["recording"] = {"sensor": _ONE_SENSOR["id"], **document["recording"]}
     return {
         **document,
         "skin": {
-            **{name: document["skin"].get(name) for name in skin},
-            **_of_skin(contents.properties, kind),
-            **({"sensors": sensors or [dict(_ONE_SENSOR)]} if kind == "frf" else {}),
+            **{name: document["skin"].get(name) for name in of_kind.of_skin},
+            **_of_skin(contents.properties, of_kind),
+            **({"sensors": sensors or [dict(_ONE_SENSOR)]} if of_kind.is_on_sensors else {}),
         },
         "recording": {**dict.fromkeys(needed), **document["recording"]},
     }
@@ -210,13 +232,14 @@ def guessed(
     for column, field in zip(columns, fields, strict=True):
         if field and field not in channels:
             channels[field] = {"channel": column.name}
-    in_columns, derived = _row_fields(columns, texts, kind, fields)
+    of_kind = _OF_KIND[kind]
+    in_columns, derived = _row_fields(columns, texts, of_kind, fields)
     skin_values = {name: skin[name] for name in (*OF_SKIN, "sensors") if skin.get(name) is not None}
     return {
         "schema": SCHEMA,
         "kind": kind,
         "skin": {"poisson_ratio": 0.5, **skin_values},
-        "recording": {**_stated(properties, kind, dated=dated), **in_columns},
+        "recording": {**_stated(properties, of_kind, dated=dated), **in_columns},
         **({"derived": derived} if derived else {}),
         "channels": _with_spring(channels, columns, properties) if kind == "indentation" else channels,
     }
@@ -241,21 +264,21 @@ def likely(columns: Sequence[Column], properties: Mapping[str, Any] = MappingPro
         kind = "indentation"
     phases = "angle" in dimensions or any("phase" in column.name.lower() for column in columns)
     is_spectrum = "frequency" in dimensions
-    fields = []
+    fields, of_kind = [], _OF_KIND[kind]
     for column, dimension in zip(columns, dimensions, strict=True):
         name = column.name.lower()
         word = next((field for field, words in OF_CHANNELS.items() if re.search(words, name)), "")
-        field = COMPLEX_FRF if column.is_complex else _BY_DIMENSION[kind].get(dimension) or word
+        field = COMPLEX_FRF if column.is_complex else of_kind.by_dimension.get(dimension) or word
         if decibel_reference(column.unit) is not None or (dimension == DECIBEL and is_spectrum and phases):
             field = MAGNITUDE
         if field == "frf_re_pc_per_n" and _IMAGINARY.search(name):
             field = "frf_im_pc_per_n"
         if field == "frf_re_pc_per_n" and (phases or any(part in name for part in _MAGNITUDES)):
             field = MAGNITUDE
-        if is_spectrum and kind == "frf" and field in ("force_n", "charge_pc", "time_s"):
+        if is_spectrum and of_kind.is_on_sensors and field in ("force_n", "charge_pc", "time_s"):
             field = ""  # of the recording
         fields.append(field if field in channel_fields(kind) and not is_about(name) else "")
-    if kind != "frf" or is_spectrum:
+    if not of_kind.is_on_sensors or is_spectrum:
         return kind, fields
     of_rows = [_row_field(column) != "" for column in columns]
     sampled = {field for field, is_of_row in zip(fields, of_rows, strict=True) if not is_of_row}
@@ -276,7 +299,7 @@ def _row_field(column: Column) -> str:
 
 
 def _row_fields(
-    columns: Sequence[Column], texts: Sequence[str], kind: str, fields: Sequence[str]
+    columns: Sequence[Column], texts: Sequence[str], of_kind: _KindFields, fields: Sequence[str]
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """The fields of the recording that columns hold, and the formulas that these need."""
     found: dict[str, Any] = {}
@@ -287,7 +310,7 @@ def _row_fields(
         elif any(word in WHEN for word in name.lower().split()):
             found.setdefault(RECORDED_AT, {"channel": name})
     for column, field in zip(columns, fields, strict=True):
-        if field or kind != "frf":
+        if field or not of_kind.is_on_sensors:
             continue
         row_field = _row_field(column)
         is_length = _dimension(column) == "length" and ("frequency_hz" in fields or row_field == "indenter_radius_mm")
@@ -310,7 +333,7 @@ def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str
         if parts is not None and column not in common:
             by_sensor.setdefault(parts["first"], {})[parts["rest"]] = column
     alike = {tuple(of_sensor) for of_sensor in by_sensor.values()}
-    if document["kind"] != "frf" or not common or len(by_sensor) < 2 or len(alike) != 1:
+    if not common or len(by_sensor) < 2 or len(alike) != 1:
         return {}
     entries = []
     for sensor, of_sensor in by_sensor.items():
@@ -322,16 +345,16 @@ def _entries(columns: Sequence[Column], document: Mapping[str, Any]) -> dict[str
     return {"channels": {"frequency_hz": {"channel": common[0].name}}, "recordings": entries}
 
 
-def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
+def _stated(properties: Mapping[str, Any], of_kind: _KindFields, *, dated: bool) -> dict[str, Any]:
     """The recording's fields that the file itself states."""
     named = {field: {"property": names[0]} for field, names in _stated_names(properties).items()}
     when = None if dated else _time_stated(properties)
-    found = {name: named[name] for name in _OF_RECORDING[kind] if name in named}
+    found = {name: named[name] for name in of_kind.of_recording if name in named}
     position = [named[f"position_{axis}"] for axis in AXES if f"position_{axis}" in named]
     return {
         **found,
         **({} if when is None else {RECORDED_AT: {"property": when}}),
-        **({"position_mm": position} if len(position) == len(AXES) and kind == "frf" else {}),
+        **({"position_mm": position} if len(position) == len(AXES) and of_kind.is_on_sensors else {}),
     }
 
 
@@ -346,12 +369,11 @@ def _stated_names(properties: Mapping[str, Any], *, own_only: bool = False) -> d
     return by_words | by_name
 
 
-def _of_skin(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
-    """The skin's fields that the file states; of curves, whose instruments report moduli, under their own names."""
-    names = _stated_names(properties, own_only=kind != "frf")
-    if kind == "indentation":
-        names = {name: given for name, given in _stated_names(properties).items() if name == "thickness_mm"} | names
-    of_skin = {name: {"property": names[name][0]} for name in (*OF_SKIN, "d33_pc_per_n") if name in names}
+def _of_skin(properties: Mapping[str, Any], of_kind: _KindFields) -> dict[str, Any]:
+    """The skin's fields that the file states."""
+    by_words = {name: given for name, given in _stated_names(properties).items() if name in of_kind.skin_by_words}
+    names = by_words | _stated_names(properties, own_only=True)
+    of_skin = {name: {"property": names[name][0]} for name in (*OF_SKIN, _D33) if name in names}
     own = {name: {"property": f"skin.{name}"} for name in _OPTIONAL_OF_SKIN if f"skin.{name}" in properties}
     return of_skin | own
 

@@ -361,6 +361,8 @@ class Lines:
     curves: ClassVar[bool] = False  # whether the rows are samples of force
     parts: ClassVar[int] = 2  # real and imaginary, of a row
     row_axes: ClassVar[tuple[str, ...]] = ("frequency_hz", "phase")  # along which the rows of a recording run
+    level_bounds: ClassVar[tuple[float, float]] = (0.1, 100.0)  # of the common factor of the deviations
+    held_out: ClassVar[str] = "recordings"  # what is left out to be predicted, in a sentence
 
     @property
     def recordings(self) -> int:
@@ -454,6 +456,8 @@ class CurveRows(Lines):
     curves: ClassVar[bool] = True
     parts: ClassVar[int] = 1
     row_axes: ClassVar[tuple[str, ...]] = ("displacement_mm",)
+    level_bounds: ClassVar[tuple[float, float]] = (0.3, 5.0)  # larger noise would exceed the differences of neighbours
+    held_out: ClassVar[str] = "samples"
 
     @cached_property
     def about_means(self) -> tuple[float, int]:

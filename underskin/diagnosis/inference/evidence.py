@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from underskin.diagnosis.inference.fit import Fitter, Scatter
-from underskin.diagnosis.inference.gaussian import NormalMixture
+from underskin.diagnosis.inference.gaussian import LEAST_EIGENVALUE, NormalMixture
 from underskin.diagnosis.inference.hypothesis import (
     FLAT,
     Evaluated,
@@ -44,7 +44,6 @@ _LEAST_COVARIANCE_CURVATURE = 0.3  # in the logarithms of noise levels: their pr
 _REMAINING_GAIN = 1.0  # gain in log posterior that polishing may leave
 _LEAST_BOUNDS_TERM = -50.0  # nats: bounds around the point reduce an integral by less, and never raise it
 NEGLIGIBLE_NATS = 12.0  # of log evidence behind the best: odds of 1 to 160,000, which no other set makes up for
-_LEAST_EIGENVALUE = 1e-11  # of correlations or their information: less is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,9 +179,9 @@ def _definite(information: Floats) -> Floats:
     """The information with positive eigenvalues, which rounding may have made negative where it is nearly singular."""
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    if values[0] > _LEAST_EIGENVALUE:
+    if values[0] > LEAST_EIGENVALUE:
         return information
-    return np.asarray((vectors * np.maximum(values, _LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
+    return np.asarray((vectors * np.maximum(values, LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
 
 
 def level_integrals(fitter: Fitter, at: Evaluated) -> Floats:

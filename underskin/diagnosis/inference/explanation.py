@@ -42,9 +42,8 @@ from underskin.units import Floats, Indices, Mask
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _STARTS = 3  # fitted, of each hypothesis
-# Newton steps of the noise levels at each start; more where a mechanism without a parent acts on them
-_NOISE_LEVEL_STEPS, _NOISE_LEVEL_STEPS_WITHOUT_PARENT = 1, 10
-_STARTS_FROM_PARENT = 1  # of curves, where an explanation with one mechanism less is known
+# Newton steps of the noise levels at each start where a mechanism without a parent acts on them; else one
+_NOISE_LEVEL_STEPS_WITHOUT_PARENT = 10
 _CONTACT_POINT_STARTS = 4  # points of the grid, of curves, from which contact points are searched
 _DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
 
@@ -55,7 +54,7 @@ def best_starts(fitter: Fitter, request: "Request") -> Points:
     grid = _Grid(fitter.hypothesis, request.known)
     initial = fitter.initial(grid.coordinates, request.start)
     many_steps = fitter.covariance_indices.size and request.known is None
-    at = fitter.update_noise_levels(initial, _NOISE_LEVEL_STEPS_WITHOUT_PARENT if many_steps else _NOISE_LEVEL_STEPS)
+    at = fitter.update_noise_levels(initial, _NOISE_LEVEL_STEPS_WITHOUT_PARENT if many_steps else 1)
     cost = at.cost[: grid.size].reshape(grid.shape)
     # Many steps move the mechanisms' covariance parameters off the grid, so that all its points are kept.
     on_grid = np.arange(grid.size) if many_steps else np.flatnonzero(_are_lowest(cost))
@@ -142,7 +141,7 @@ def _starts_of_curves(
     if fitter.lines.kind == "indentation" and (moves_contact or request.start is None):
         candidates = _with_contact_points(fitter, candidates)
     begins_at_guesses = any(isinstance(fitter.lines.mechanisms[name], UnlistedLaw) for name in new_names)
-    count = _STARTS_FROM_PARENT if request.known is not None and not begins_at_guesses else _STARTS
+    count = 1 if request.known is not None and not begins_at_guesses else _STARTS
     starts = candidates.points[np.sort(_cheapest(candidates)[:count])]
     if not (moves_contact and guess_count):
         return starts
@@ -409,8 +408,6 @@ class FittingProblem:
 
     def _position_matters(self, fitter: Fitter, points: Points) -> bool:
         """Whether position scatter, as large as it usually gets, would show in some recording at one of the points."""
-        if self.lines.curves:
-            return False
         products = fitter.products(points, slopes=False, place=True)
         if products.squared_slopes is None:
             return False

@@ -16,7 +16,7 @@ import numpy as np
 from underskin.units import Floats
 
 _INFORMS = 0.2  # of a prior's precision: the least that informative recordings add
-_LEAST_SHARE = 1e-11  # of a prior's variance: less is rounding
+LEAST_EIGENVALUE = 1e-11  # of scaled covariances or their information, which are about 1: less is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Gaussian:
         """
         root = np.sqrt(precision)
         shares, vectors = np.linalg.eigh(root[:, None] * covariance * root)
-        values = 1 / np.maximum(shares, _LEAST_SHARE)
+        values = 1 / np.maximum(shares, LEAST_EIGENVALUE)
         informing = vectors[:, values > 1 + _INFORMS]
         ratios = values[values > 1 + _INFORMS]
         added = (informing * (ratios - 1)) @ informing.T * np.outer(root, root)

@@ -304,8 +304,6 @@ class Evaluated(AtPoints):
 
 
 FLAT = 1e-3  # standard deviations of a quadratic, at least, within a parameter's bounds: keeps information invertible
-_LEVELS = (0.1, 100.0)  # bounds of the lines' level
-_CURVE_LEVELS = (0.3, 5.0)  # least accuracy of a cell; larger noise would exceed the differences of neighbours
 
 
 @dataclass(frozen=True)
@@ -339,7 +337,7 @@ class Hypothesis:
     def covariance(self) -> tuple[CovarianceParameter, ...]:
         """Gain scatter, line level, positioning scatter or smooth error if any, then those of the model's
         mechanisms."""
-        low, high = _CURVE_LEVELS if self.lines.curves else _LEVELS
+        low, high = self.lines.level_bounds
         level = level_prior(self.lines.noise.log_level_sd)
         common = [
             CovarianceParameter("gain", np.log(1e-3), np.log(0.5), self.gain),
@@ -348,7 +346,7 @@ class Hypothesis:
         if self.has_position_scatter:
             highest = POSITION_PRIOR.high + np.log(2.0)
             common.append(CovarianceParameter("position", np.log(2e-5), highest, POSITION_PRIOR))
-        if self.lines.curves:
+        if self.lines.smooth is not None:
             common.append(CovarianceParameter("smooth", np.log(1e-5), np.log(2.0), self.smooth))
         of_model = [
             CovarianceParameter(parameter.name, *parameter.bounds, _as_plateau(parameter))

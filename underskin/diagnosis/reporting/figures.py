@@ -41,7 +41,6 @@ from underskin.units import Complexes, Floats, readable_unit
 
 _GREY = "#BBBBBB"
 _MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, up to which numbers are shown
-_CELL = 10  # pixels, size of these numbers: 7.5 points on paper
 _TITLE, _TITLE_LINE = 18, 16  # of a panel: characters per line; pixels of a line
 _ABOVE_NOISE = 2.0  # least end of a map's colour scale, over the 95 % interval of the noise
 _LABEL = 24  # characters per line of a label
@@ -159,7 +158,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, a
         customdata=count.reshape(shape),
         text=np.array([_percent_label(value) for value in mean]).reshape(shape) if labelled else None,
         texttemplate="%{text}" if labelled else None,
-        textfont={"size": _CELL} if len(y.names) <= _MOST_ABREAST else None,
+        textfont={"size": 10} if len(y.names) <= _MOST_ABREAST else None,
         xgap=1,
         ygap=1,
         colorbar={"title": {"text": f"{part.name} [%]", "side": "right"}},
@@ -280,7 +279,6 @@ def _outline(diagnosis: DiagnosisResult, axis: str | None, levels: Levels) -> tu
 
 _MARKERS = ("circle", "square", "diamond", "cross", "triangle-up", "x")
 _SENSORS_WIDTH = 0.5  # of the distance between campaigns, over which the sensors of one are spread
-_ROW, _OF_SKIN = 130, 22  # height of a quantity, and of a skin in it [pixels]
 
 
 def several_figures(document: Mapping[str, Any]) -> dict[str, go.Figure]:
@@ -412,7 +410,7 @@ def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
         figure.add_vline(x=population["mean"], line={"color": "#000000", "width": 1}, row=panel, col=1)
     figure.update_layout(
         title="Each skin, and the band in which 95 % of such skins lie",
-        height=150 + len(populations) * (_ROW + _OF_SKIN * skins),
+        height=150 + len(populations) * (130 + 22 * skins),
     )
     return styled(figure)
 

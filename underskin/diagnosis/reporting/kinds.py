@@ -25,16 +25,15 @@ class KindTraits:
     """One kind of recordings in reports.
 
     `recordings`: in a sentence; `measured`: the parameter that they measure; `response`: what is recorded; `part`: its
-    real part by itself, and after the response; `held_out`: what of them is held out, in a sentence; `lists_untried`:
-    whether mechanisms that they do not support are named beside a residual; `title` and `along`: of the figure of
-    curves, and of its abscissa; `per_si`: the unit of figures over the SI unit of a response.
+    real part by itself, and after the response; `lists_untried`: whether mechanisms
+    that they do not support are named beside a residual; `title` and `along`: of the figure of curves, and of its
+    abscissa; `per_si`: the unit of figures over the SI unit of a response.
     """
 
     recordings: str
     measured: str
     response: str = "force"
     part: tuple[str, str] = ("force", "")
-    held_out: str = "samples"
     lists_untried: bool = True
     title: str = ""
     along: str = ""
@@ -47,7 +46,6 @@ KINDS: Mapping[Kind, KindTraits] = {
         "d33",
         response="FRF",
         part=("in phase", ", in phase"),
-        held_out="recordings",
         lists_untried=False,
         per_si=1e12,
     ),

@@ -230,9 +230,6 @@ class _Curve:
         return [max(low - air, float(self._depth(curve.sample_mm).min()) - edge), high + edge]
 
 
-_ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
-_HEIGHT = 700  # pixels
-_LONG_TITLE = 11  # pixels: fits the height of a panel in a narrow window
 _IN_VIEW = 10.0  # times the noise's band: initial range of residuals
 _FEW = 3  # lines up to which a model has markers
 _NONE = 1e-9  # pC/N: least scale of a residual
@@ -256,7 +253,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
     models = models_of(before, after)
     few = min(len(recording.frequency_hz) for recording in recordings) <= _FEW
     traces = _traces(models, few)
-    figure = make_subplots(4, 1, shared_xaxes=True, vertical_spacing=0.035, row_heights=_ROWS)
+    figure = make_subplots(4, 1, shared_xaxes=True, vertical_spacing=0.035, row_heights=(0.34, 0.2, 0.23, 0.23))
     numbers = [_numbers(recording, [trace.role for trace in traces]) for recording in recordings]
     for index, trace in enumerate(traces):
         axis = "" if trace.panel == 1 else str(trace.panel)
@@ -277,7 +274,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
     for row, title in enumerate(titles, start=1):
         figure.update_yaxes(title=title, row=row, col=1)
     for row in (3, 4):
-        figure.update_yaxes(title_font_size=_LONG_TITLE, row=row, col=1)
+        figure.update_yaxes(title_font_size=11, row=row, col=1)  # fits the height of a panel in a narrow window
     figure.update_yaxes(**WHOLE_NUMBERS, row=1, col=1)
     views = [_view(recording, bool(before)) for recording in recordings]
     for path, value in views[0].items():
@@ -285,7 +282,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
     figure.update_layout(
         title="Measured and predicted, recording by recording",
         **_style(),
-        height=_HEIGHT,
+        height=700,
         margin={"l": 90, "r": 20, "t": 80, "b": 100},
         legend=BELOW,
         meta={
@@ -398,9 +395,6 @@ def _label(shown: ShownFrf, both: bool) -> str:
     return f"{recording.id} ({where}): misfit {f'{before} before, {after} after' if both else after}{lines}"
 
 
-_ROW, _SPACING = 140, 0.73  # height of a parameter's row [pixels], and the share of it for labels
-
-
 def parameter_intervals(shown: Explanation, mechanisms: Sequence[Mapping[str, Any]]) -> go.Figure:
     """Each parameter's 95 % interval in its unit; that of its prior is in words, since drawn it would dwarf it."""
     priors = shown.spans
@@ -416,7 +410,7 @@ def parameter_intervals(shown: Explanation, mechanisms: Sequence[Mapping[str, An
         f"{name.replace('_', ' ')}<br>{_labelled(parameter)}<br><sup>{_before(prior, scale, parameter['unit'])}</sup>"
         for name, parameter, prior, scale in rows
     ]
-    figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_SPACING / len(rows))
+    figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=0.73 / len(rows))  # labels
     figure.update_annotations(font_size=SMALL_TITLE)
     for panel, (_, parameter, *_) in enumerate(rows, start=1):
         low, high = parameter["low"], parameter["high"]
@@ -434,7 +428,7 @@ def parameter_intervals(shown: Explanation, mechanisms: Sequence[Mapping[str, An
     figure.update_yaxes(visible=False, range=[-1, 1])
     figure.update_layout(
         title="What the recordings say of the parameters",
-        height=200 + _ROW * len(rows),
+        height=200 + 140 * len(rows),
         legend=BELOW,
         margin={"t": 110, "b": 90},
     )

@@ -166,7 +166,7 @@ def _answer_clauses(facts: Facts, doubts: Sequence[str], *, all_used: bool, all_
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
     lead = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
-        total = in_percent(sum(answer.probability for answer in answers if answer.kind == leader.kind))
+        total = in_percent(sum(answer.probability for answer in answers if answer.outcome == leader.outcome))
         lead = f"known mechanisms explain this ({total} together), best {in_words(leader.names)} ({percent})"
     all_answers = f"in most of the remaining answers: {common}" if common else ""
     return [f"{lead}, but {', and '.join(but)}", all_answers, misfit, _law(mentioned)]
@@ -366,7 +366,7 @@ def _law_clauses(facts: Facts, leading: LeadingLaw, document: Mapping[str, Any])
     acts_on, axis = law.description.acts_on, law.description.axis
     besides = f" besides {others}" if others else ""
     floor, held = facts.fit["noise_floor_percent"], document["heldout_rmse_percent"]
-    worth = _worth(held, floor, facts.traits.held_out, f" and {others}" if others else "")
+    worth = _worth(held, floor, facts.problem.lines.held_out, f" and {others}" if others else "")
     altered = _altered(leading, document)
     second = [f"what is missing{besides} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, altered]
     rivals = [

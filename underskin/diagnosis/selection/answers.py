@@ -62,18 +62,18 @@ class Answer:
         return (*self.explanation.names, *self.alone) or (NOTHING_MISSING,)
 
     @property
-    def kind(self) -> str:
+    def outcome(self) -> str:
         """`nothing_missing`, `none_of_these`, or "" of sets of mechanisms."""
         return self.names[0] if self.names in ((NOTHING_MISSING,), (NONE_OF_THESE,)) else ""
 
 
 def leading_first(ranked: Sequence[Answer]) -> list[Answer]:
-    """Answers, the most probable first, with the first one of the most probable kind before all others."""
-    by_kind = defaultdict[str, float](float)
+    """Answers, the most probable first, with the first one of the most probable outcome before all others."""
+    by_outcome = defaultdict[str, float](float)
     for answer in ranked:
-        by_kind[answer.kind] += answer.probability
-    most = max(by_kind, key=lambda kind: by_kind[kind])
-    leader = next(answer for answer in ranked if answer.kind == most)
+        by_outcome[answer.outcome] += answer.probability
+    most = max(by_outcome, key=lambda outcome: by_outcome[outcome])
+    leader = next(answer for answer in ranked if answer.outcome == most)
     return [leader, *(answer for answer in ranked if answer is not leader)]
 
 
@@ -290,7 +290,7 @@ class Search:
     def _log_odds_of_discrepancy(self, fitted: Explanation) -> float:
         """Log odds that the smooth error beside a set is of a law that is missing, and not the idealisation of its own;
         −∞ of FRFs."""
-        if not fitted.best.hypothesis.lines.curves:
+        if fitted.best.hypothesis.lines.smooth is None:
             return -math.inf
         log_size = math.log(fitted.best.levels.smooth)
         beneath = self.log_prior_beneath(fitted) - self.log_prior(fitted)

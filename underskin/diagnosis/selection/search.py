@@ -225,11 +225,7 @@ def frf_problem(
     mechanisms.bind(measured.campaign, table, "frf")
     problem = FittingProblem(measured, table)
     unsupported = _unsupported(problem)
-    names = [
-        name
-        for name, mechanism in mechanisms.named.items()
-        if name not in unsupported and "frf" in mechanism.kinds and mechanism.needs_lines
-    ]
+    names = [name for name, mechanism in mechanisms.named.items() if name not in unsupported and mechanism.needs_lines]
     fits = problem.explain_all([Request(()), *(Request((name,)) for name in names)])
     null, *singles = fitted = [fit for fit in fits if fit is not None]
     moving_mean = [

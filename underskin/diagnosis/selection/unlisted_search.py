@@ -117,9 +117,9 @@ class Screening:
         self._frequency, self._line = np.unique(problem.lines.frequency, return_inverse=True)
         self._features: dict[tuple[Axis, Shape], Floats] = {}
 
-        def laws_of(kind: type[Law]) -> list[tuple[Law, float]]:
+        def laws_of(form: type[Law]) -> list[tuple[Law, float]]:
             laws = zip(grammar.laws, grammar.log_shares.tolist(), strict=True)
-            return [(law, log_share) for law, log_share in laws if isinstance(law, kind)]
+            return [(law, log_share) for law, log_share in laws if isinstance(law, form)]
 
         self._of_recordings = _Group.of(laws_of(RecordingLaw), lambda law: law.description.acts_on)
         self._over_frequency = _Group.of(laws_of(FrequencyLaw), lambda _: "")

@@ -17,7 +17,7 @@ _WIDEST_SENSOR = 100.0  # radii over the thickness; tables end far below
 
 def without_extremes(campaign: Campaign) -> Inspected:
     """The campaign without recordings that hold impossible numbers, each a finding; `lacking` where its skin does."""
-    of_skin = _of_skin(campaign.skin, any(isinstance(recording, FrfRecording) for recording in campaign.recordings))
+    of_skin = _of_skin(campaign.skin, bool(campaign.of(FrfRecording)))
     if of_skin:
         arguments = {"fields": [finding.field for finding in of_skin], "confirmable": False}
         return Inspected(replace(campaign, recordings=()), of_skin, Lacking(Lack.IMPOSSIBLE_DECLARATION, arguments))

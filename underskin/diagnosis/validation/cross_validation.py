@@ -236,7 +236,7 @@ def nearest_law_findings(problem: FittingProblem, result: Search, null: Explanat
     arguments = {
         "tried": nearest.tried,
         "law": law.description.words,
-        "part": "samples" if problem.lines.curves else "recordings",
+        "part": problem.lines.held_out,
         "after_percent": after.rmse_percent,
         "before_percent": before.rmse_percent,
     }

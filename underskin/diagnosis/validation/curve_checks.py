@@ -56,7 +56,7 @@ from underskin.mechanisms.laws.strain_stiffening import StrainStiffening
 from underskin.mechanisms.laws.thickness_error import ThicknessError
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.mechanisms.registry import ActiveCatalogue
-from underskin.recordings.campaign import Campaign, CurveConditions, CurveRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CurveConditions, CurveRecording, IndentationRecording, curves_of
 from underskin.units import Floats
 
 _CHANCE = 1e-3  # of a poor rig whose curves would be said to contradict each other
@@ -82,7 +82,7 @@ def curve_spread_findings(problem: FittingProblem, stated: Explanation, null: Ex
         return _of_one(moduli, recordings)
     if shapes > 1 and not is_held:
         return [moduli.finding(Reason.SPECIMENS_DIFFER, recordings)]
-    spheres = [recording for recording in recordings if isinstance(recording, IndentationRecording)]
+    spheres = campaign.of(IndentationRecording)
     radii = [sphere.indenter_radius_mm for sphere in spheres] if len(spheres) == len(recordings) else []
     remedies = [words for words, changed in _other_radii(radii) if moduli.agree(np.log(changed) / 2)]
     return [moduli.finding(Reason.CURVES_DIFFER, recordings, remedies=remedies[:MOST_QUOTED])]
@@ -91,7 +91,7 @@ def curve_spread_findings(problem: FittingProblem, stated: Explanation, null: Ex
 def _moduli(problem: FittingProblem, explanation: Explanation) -> "_Moduli | None":
     """The moduli of the curves under a set of mechanisms; None of a single one, and where the model has no force."""
     lines, recordings = problem.lines, problem.lines.campaign.curves
-    if not lines.curves or len(recordings) < 2:
+    if len(recordings) < 2:
         return None
     noise = explanation.best.levels.level * lines.deviation
     measured, model = (column.real / noise for column in (lines.value, row_prediction(problem, explanation)))
@@ -325,8 +325,7 @@ def _changes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
     force, slopes, stiffness = force_and_slopes(explanation)
     model, fit = explanation.best.hypothesis.model, explanation.point.fit
     assert isinstance(model, CurveModel)
-    campaign = explanation.best.hypothesis.lines.campaign
-    recordings = [recording for recording in campaign.recordings if isinstance(recording, CurveConditions)]
+    recordings = curves_of(explanation.best.hypothesis.lines.campaign)
     return force, slopes, _law_changes(recordings, fit[model.contact_points], force, stiffness)
 
 

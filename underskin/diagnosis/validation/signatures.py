@@ -56,14 +56,12 @@ class Signatures:
         self.percent: list[float] = []
         self._columns: list[tuple[Array, Lines]] = [(slope, fitter.lines) for slope in base.slopes]
         for name, mechanism in problem.lines.mechanisms.named.items():
-            if problem.kind not in mechanism.kinds:
-                continue
-            parameters = mechanism.parameters(problem.lines.campaign, problem.kind)
-            if any(parameter.moves_covariance for parameter in parameters):
-                continue
             try:
                 hypothesis = problem.hypothesis((name,), has_position_scatter=False)
             except Unsupported:
+                continue
+            parameters = mechanism.parameters(problem.lines.campaign, problem.kind)
+            if any(parameter.moves_covariance for parameter in parameters):
                 continue
             shapes = np.array([[*shape, *self._point.fit[0]] for shape in _shapes(parameters)])
             model = hypothesis.model

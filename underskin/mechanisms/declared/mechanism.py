@@ -295,7 +295,7 @@ class DeclaredOfCurves(DeclaredMechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Recordings without times, where the law reads them."""
-        curves = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
+        curves = conditions.of(IndentationConditions)
         untimed = "time_s" in self.axes_read and any(recording.time_s is None for recording in curves)
         return "not every recording has time_s" if untimed else None
 

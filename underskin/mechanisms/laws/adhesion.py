@@ -63,16 +63,13 @@ class Adhesion(Mechanism):
         """The work of adhesion, and of separation where an indentation has a way back."""
         if kind == "frf":
             return self.parameters_stated
-        returns = any(
-            isinstance(recording, IndentationConditions) and _comes_back(recording)
-            for recording in conditions.recordings
-        )
+        returns = any(map(_comes_back, conditions.of(IndentationConditions)))
         return (_WORK, _SEPARATION) if returns else (_WORK,)
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """From the least forces on both ways: -4πwR/3 at snap-in, -5πwR/6 to -3πwR/2 at pull-off."""
-        measured = [recording for recording in conditions.recordings if isinstance(recording, IndentationRecording)]
-        if kind != "indentation" or not measured:
+        measured = conditions.of(IndentationRecording)
+        if not measured:
             return ()
         works = np.array([_works(recording) for recording in measured])
         snap_in, pull_off = np.clip(np.median(works, axis=0), _WORK.low, _WORK.high)

@@ -63,6 +63,6 @@ class AmplifierLowPass(Mechanism):
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _highest_hz(conditions: Conditions) -> float:
     """The highest line of all recordings [Hz]; ∞ without one."""
-    columns = [recording.frequency_hz for recording in conditions.recordings if isinstance(recording, FrfConditions)]
+    columns = [recording.frequency_hz for recording in conditions.of(FrfConditions)]
     highest = [float(np.max(lines, initial=0.0, where=np.isfinite(lines))) for lines in columns if lines is not None]
     return max(highest, default=math.inf)

@@ -59,9 +59,7 @@ class CellCollapse(Mechanism):
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Where no sample is pressed far enough, a plateau cannot show."""
-        pressed = [
-            _pressed(recording) for recording in conditions.recordings if isinstance(recording, CompressionConditions)
-        ]
+        pressed = [_pressed(recording) for recording in conditions.of(CompressionConditions)]
         if max(pressed, default=0.0) < _PLATEAU_SHOWS:
             return f"no sample is pressed by {100 * _PLATEAU_SHOWS:g} % of its height"
         return None

@@ -9,7 +9,7 @@ from underskin.autodiff import exp
 from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Parameter, Stage, Uniform, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.recordings.campaign import CompressionConditions, Conditions, CurveConditions, IndentationConditions
+from underskin.recordings.campaign import Conditions, CurveConditions, FrfConditions, IndentationConditions, curves_of
 from underskin.units import Floats
 
 # Curves that add no information by their times: share of the span, of the duration; ratio of speeds
@@ -89,9 +89,10 @@ class ContactCreep(Mechanism):
         self, conditions: Conditions, kind: Kind = "frf", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
         """One Prony pair; of curves also the exponent of a power law."""
+        stated = {"frf": _FRF, "indentation": _INDENTATION, "compression": _COMPRESSION}[kind]
         if kind != "indentation":
-            return _FRF if kind == "frf" else _COMPRESSION
-        fraction, time, exponent = _INDENTATION
+            return stated
+        fraction, time, exponent = stated
         intervals = [np.median(np.diff(times)) for times in _times(conditions)]
         time = replace(time, low=max(float(min(intervals, default=0.0)), _SHORTEST))
         longest = max((float(np.ptp(times)) for times in _times(conditions)), default=0.0)
@@ -101,18 +102,14 @@ class ContactCreep(Mechanism):
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Times must be independent of the loads: dwell_s that differ, or time_s that does not follow displacement."""
         if kind != "frf":
-            curves = [
-                recording
-                for recording in conditions.recordings
-                if isinstance(recording, IndentationConditions | CompressionConditions) and recording.kind == kind
-            ]
+            curves = [curve for curve in curves_of(conditions) if curve.kind == kind]
             lacking = [recording.id for recording in curves if recording.time_s is None]
             if lacking:
                 return f"recording {lacking[0]!r} has no time_s"
             if time_runs_with_displacement(curves):
                 return "all curves go one way at one speed: time and displacement cannot be separated"
             return None
-        dwell = {recording.id: recording.dwell_s for recording in conditions.recordings if recording.kind == kind}
+        dwell = {recording.id: recording.dwell_s for recording in conditions.of(FrfConditions)}
         lacking = [name for name, value in dwell.items() if value is None]
         if lacking:
             return f"recording {lacking[0]!r} has no dwell_s"
@@ -140,9 +137,10 @@ def meaning(values: Mapping[str, float], _: Conditions) -> str:
 
 def _times(conditions: Conditions) -> list[Floats]:
     """The times of the indentations that have them [s]."""
-    indentations = (recording for recording in conditions.recordings if isinstance(recording, IndentationConditions))
     return [
-        recording.time_s for recording in indentations if recording.time_s is not None and len(recording.time_s) > 1
+        recording.time_s
+        for recording in conditions.of(IndentationConditions)
+        if recording.time_s is not None and len(recording.time_s) > 1
     ]
 
 

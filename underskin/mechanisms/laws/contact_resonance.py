@@ -61,7 +61,7 @@ class ContactResonance(Mechanism):
 def _resonance_guesses(conditions: Conditions) -> list[tuple[float, float]]:
     """Tip mass [g] and damping ratio."""
     skin = conditions.skin
-    measured = [recording for recording in conditions.recordings if isinstance(recording, FrfRecording)]
+    measured = conditions.of(FrfRecording)
     resonances = [
         (index, peak)
         for index, recording in enumerate(measured)

@@ -54,11 +54,7 @@ class InstrumentCompliance(Mechanism):
         self, conditions: Conditions, kind: Kind = "indentation", others: Collection[Mechanism] = ()
     ) -> tuple[Parameter, ...]:
         """The stiffness, expected for the spheres of the recordings, or of the frames that press blocks."""
-        radii = [
-            recording.indenter_radius_mm
-            for recording in conditions.recordings
-            if isinstance(recording, IndentationConditions)
-        ]
+        radii = [recording.indenter_radius_mm for recording in conditions.of(IndentationConditions)]
         (stiffness,) = self.parameters_stated
         if kind == "compression":
             return (replace(stiffness, prior=Normal(math.log(_OF_FRAMES), _SD_OF_FRAMES), low=_SOFTEST_FRAME),)

@@ -69,8 +69,7 @@ def _contact_radius_mm(conditions: Conditions) -> float:
     """About the largest of the recordings, √(R δ)."""
     radii = [
         math.sqrt(recording.indenter_radius_mm * max(_depth_mm(recording), 1e-12))
-        for recording in conditions.recordings
-        if isinstance(recording, IndentationConditions)
+        for recording in conditions.of(IndentationConditions)
     ]
     return max(radii, default=1.0)
 

@@ -116,4 +116,4 @@ def meaning(values: Mapping[str, float], conditions: Conditions) -> str:
 
 
 def _indentations(conditions: Conditions) -> list[IndentationConditions]:
-    return [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
+    return conditions.of(IndentationConditions)

@@ -88,7 +88,7 @@ def _outstanding_mains(conditions: Conditions) -> float:
     """The mains frequency [Hz] whose lines are stronger; where none does, the one that has a line nearest."""
     lines = np.concatenate([frequencies(recording) for recording in frf_of(conditions)])
     nearest = {mains: float(np.abs(lines - mains).min()) for mains in MAINS_HZ}
-    measured = [lines_of(recording) for recording in conditions.recordings if isinstance(recording, FrfRecording)]
+    measured = [lines_of(recording) for recording in conditions.of(FrfRecording)]
     return max(MAINS_HZ, key=lambda mains: (_excess(measured, mains), -nearest[mains]))
 
 

@@ -60,6 +60,5 @@ def _shapes(conditions: Conditions) -> list[float]:
     """S² of each cylinder."""
     return [
         (0.25 * recording.sample_diameter_mm / recording.sample_height_mm) ** 2
-        for recording in conditions.recordings
-        if isinstance(recording, CompressionConditions)
+        for recording in conditions.of(CompressionConditions)
     ]

@@ -89,10 +89,8 @@ class StrainStiffening(Mechanism):
 
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """Of measured cylinders c2 and c3 by linear least squares at m = 2 and several α."""
-        curves = [recording for recording in conditions.recordings if isinstance(recording, CompressionRecording)]
-        if kind != "compression" or not curves:
-            return ()
-        return [(*_polynomial(curves, alpha), 2.0, alpha) for alpha in _ALPHAS]
+        curves = conditions.of(CompressionRecording)
+        return [(*_polynomial(curves, alpha), 2.0, alpha) for alpha in _ALPHAS] if curves else ()
 
     def act(self, state: Contacts | Curve, values: Values) -> None:
         """Stiffen each contact by its own strain; a curve takes the law."""
@@ -130,7 +128,7 @@ def meaning(values: Mapping[str, float], conditions: Conditions) -> str:
     if "ogden_exponent" not in values:
         return ""
     law = [np.array(values[parameter.name]) for parameter in _CYLINDER]
-    cylinders = [curve for curve in conditions.recordings if isinstance(curve, CompressionRecording)]
+    cylinders = conditions.of(CompressionRecording)
     strains = [1.0 - _stretch(curve) for curve in cylinders]
     said = []
     for how, sign in (("pressed", 1.0), ("pulled", -1.0)):

@@ -51,6 +51,6 @@ class TimingDelay(Mechanism):
 @cached_while_alive  # a diagnosis composes dozens of models of one campaign
 def _delay_guess(conditions: Conditions) -> list[tuple[float]]:
     """The delay [µs]."""
-    measured = [lines_of(recording) for recording in conditions.recordings if isinstance(recording, FrfRecording)]
+    measured = [lines_of(recording) for recording in conditions.of(FrfRecording)]
     delay = common_delay(stacked(measured)) if measured else 0.0
     return [(1e6 * delay,)] if delay else []

@@ -190,7 +190,7 @@ class CompressionModel(CurveModel):
 
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
-        recordings = [recording for recording in conditions.recordings if isinstance(recording, CompressionConditions)]
+        recordings = conditions.of(CompressionConditions)
         nuisances = _nuisances(recordings, conditions.skin)
         super().__init__(mechanisms, conditions, "compression", recordings, nuisances)
         self._height = to_si("sample_height_mm", [recording.sample_height_mm for recording in recordings])[:, None]

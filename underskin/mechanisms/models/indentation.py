@@ -65,7 +65,7 @@ class IndentationModel(CurveModel):
 
     def __init__(self, mechanisms: Sequence[Mechanism], conditions: Conditions) -> None:
         """Compute all that no parameter changes; InvalidInput names a recording that does not load."""
-        recordings = [recording for recording in conditions.recordings if isinstance(recording, IndentationConditions)]
+        recordings = conditions.of(IndentationConditions)
         sticks = any(mechanism.name == AdhesionLaw.name for mechanism in mechanisms)
         nuisances = _nuisances(recordings, conditions.skin, sticks)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
