@@ -13,7 +13,8 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.support.diagnosed import MOST, small
+from tests.support.diagnosed import small
+from tests.support.lean_reports import BESIDE_SKINS
 
 # In an environment of its own, which `make test` sets up, or wherever it is.
 GENERATOR = shutil.which(
@@ -104,7 +105,7 @@ def test_a_campaign_is_sent_read_and_diagnosed(generated: Generated) -> None:
     array = generated.call("campaigns.campaign_d33", sent.id).array
     assert array.d33_low_pc_per_n < array.d33_pc_per_n < array.d33_high_pc_per_n
 
-    fewer = generated.models.AskFor(without=list(MOST))
+    fewer = generated.models.AskFor(without=list(BESIDE_SKINS))
     asked = generated.call("diagnoses.diagnose_campaign", sent.id, body=fewer)
     end = time.monotonic() + 240  # a machine may be busy
     while (found := generated.call("diagnoses.diagnosis", asked.id)).state not in ("done", "failed"):

@@ -15,7 +15,7 @@ from packaging.utils import canonicalize_name
 
 from tests.packaging.fresh_environment import Environment, build_wheel, new_environment, required
 from tests.support.cases import first
-from tests.support.lean_reports import beside
+from tests.support.lean_reports import BESIDE_SKINS
 from tests.support.repository import ROOT
 
 pytestmark = pytest.mark.slow  # they build the wheel and its environment
@@ -92,7 +92,7 @@ def test_environment_wheel_requires(fresh: Environment) -> None:
 
 
 def test_a_diagnosis(fresh: Environment, tmp_path: Path) -> None:
-    fewer = [part for name in beside("sensor_spread") for part in ("--without", name)]
+    fewer = [part for name in BESIDE_SKINS for part in ("--without", name)]
     printed(fresh, tmp_path, "diagnose", str(CAMPAIGN), *fewer, "--output-dir", "reports", "--html")
     report = json.loads((tmp_path / "reports" / "2017-06.json").read_text(encoding="utf-8"))
     assert report["verdict"] == "explained"
