@@ -10,14 +10,16 @@ import numpy as np
 import orjson
 
 from service.store import database, diagnoses
-from tests.support.lean_reports import BESIDE_SKINS, beside, lean_fleet, lean_together
+from tests.support.lean_reports import beside, lean_fleet, lean_together
 from tests.support.store_server import Server
 from underskin import __version__, diagnose
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription, parse, to_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
-_MOST = beside("contact_resonance", "sensor_spread")  # what is left out where any report is to be had
+# What is left out where any report is to be had: of one campaign, and of several.
+MOST = beside("contact_resonance")
+_MOST_TOGETHER = beside("contact_resonance", "sensor_spread")
 
 D33 = 14.0
 TIP_MASS_G = 4.0
@@ -91,9 +93,9 @@ def small() -> dict[str, Any]:
 
 
 @cache
-def small_report() -> dict[str, Any]:
+def small_report(without: tuple[str, ...] = MOST) -> dict[str, Any]:
     """The report on `small` that a worker makes where it is `begun`."""
-    made = diagnose(parse(small()), table(), without=BESIDE_SKINS)
+    made = diagnose(parse(small()), table(), without=without)
     return dict(orjson.loads(orjson.dumps(made.document, option=orjson.OPT_SERIALIZE_NUMPY)))
 
 
@@ -111,10 +113,10 @@ def asked(server: Server, campaign_id: str, **headers: str) -> str:
     return str(answer.json()["id"])
 
 
-def begun(server: Server, document: dict[str, Any], skin: str = "palm") -> str:
+def begun(server: Server, document: dict[str, Any], skin: str = "palm", without: tuple[str, ...] = MOST) -> str:
     """The id of a diagnosis, of few mechanisms, of a campaign that was sent."""
     campaign_id = sent(server, document, skin)
-    answer = server.http.post(f"/v1/campaigns/{campaign_id}/diagnosis", json={"without": BESIDE_SKINS})
+    answer = server.http.post(f"/v1/campaigns/{campaign_id}/diagnosis", json={"without": without})
     assert answer.status_code == 202, answer.text
     return str(answer.json()["id"])
 
@@ -140,10 +142,10 @@ def awaited(server: Server, diagnosis_id: str, *states: str) -> dict[str, Any]:
 
 
 @cache
-def report() -> dict[str, Any]:
+def report(without: tuple[str, ...] = MOST) -> dict[str, Any]:
     """The report on `resonant`, made here: what any worker makes of it, but for the headline, which is made of the rest
     where tests change that."""
-    made = diagnose(parse(resonant("array")), table())
+    made = diagnose(parse(resonant("array")), table(), without=without)
     return {**orjson.loads(orjson.dumps(made.document, option=orjson.OPT_SERIALIZE_NUMPY)), "headline": ""}
 
 
@@ -154,8 +156,8 @@ def joint_reports() -> dict[str, dict[str, Any]]:
     one, two, three = (parse(resonant(name, preloads=(1.0,), lines=6, seed=seed)) for seed, name in enumerate(names))
     fleet = {"a": [one], "b": [two], "c": [three]}
     made = {
-        "skin": lean_together([one, two], table(), "several", _MOST),
-        "fleet": lean_fleet(fleet, table(), "fleet", _MOST),
+        "skin": lean_together([one, two], table(), "several", _MOST_TOGETHER),
+        "fleet": lean_fleet(fleet, table(), "fleet", _MOST_TOGETHER),
     }
     return dict(orjson.loads(orjson.dumps(made, option=orjson.OPT_SERIALIZE_NUMPY)))
 

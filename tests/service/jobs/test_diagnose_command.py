@@ -6,15 +6,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from tests.support.diagnosed import sent, small, small_report
-from tests.support.lean_reports import BESIDE_SKINS
+from tests.support.diagnosed import MOST, sent, small, small_report
 from tests.support.store_server import Server
 from underskin.cli.app import app
 
 
 def test_reports_of_kept_campaigns_are_those_of_the_service(working: Server, tmp_path: Path) -> None:
     reports = tmp_path / "reports"
-    kept, few = sent(working, small()), [word for name in BESIDE_SKINS for word in ("--without", name)]
+    kept, few = sent(working, small()), [word for name in MOST for word in ("--without", name)]
     given = ["--campaign", kept, "--campaign", "nowhere", "--url", str(working.http.base_url), *few]
     result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(reports), "--html"])
     assert result.exit_code == 2

@@ -14,8 +14,20 @@ import pytest
 from service.store import database, diagnoses
 from service.store.tables import diagnoses as table_of_diagnoses
 from tests.service.backends import on
-from tests.support.diagnosed import asked, awaited, begun, found, report, resonant, sent, small, small_report, table
-from tests.support.lean_reports import BESIDE_SKINS, beside
+from tests.support.diagnosed import (
+    MOST,
+    asked,
+    awaited,
+    begun,
+    found,
+    report,
+    resonant,
+    sent,
+    small,
+    small_report,
+    table,
+)
+from tests.support.lean_reports import BESIDE_SKINS
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import Client, ServiceError, __version__
 
@@ -73,18 +85,18 @@ def is_gone(pid: int) -> bool:
 def test_a_campaign_is_diagnosed_once(working: Server) -> None:
     with Client(str(working.http.base_url)) as client:
         campaign_id = sent(working, small())
-        started = client.diagnoses.start(campaign_id, without=BESIDE_SKINS)
+        started = client.diagnoses.start(campaign_id, without=MOST)
         shares: list[float] = []
         done = client.diagnoses.wait(started["id"], progress=shares.append)
         assert (done["state"], done["verdict"], done["progress"]) == ("done", "explained", 1.0)
         assert shares == sorted(shares)
         assert done["report"] == small_report()
-        assert client.diagnoses.start(campaign_id, without=BESIDE_SKINS) == {"id": started["id"], "state": "done"}
+        assert client.diagnoses.start(campaign_id, without=MOST) == {"id": started["id"], "state": "done"}
         with pytest.raises(ServiceError, match="cannot be cancelled"):
             client.diagnoses.cancel(started["id"])
         client.campaigns.exclude(campaign_id, "r3", "cable loose")
         assert client.diagnoses.get(started["id"])["outdated"].startswith("changed")
-        second = client.diagnoses.wait(client.diagnoses.start(campaign_id, without=BESIDE_SKINS)["id"])
+        second = client.diagnoses.wait(client.diagnoses.start(campaign_id, without=MOST)["id"])
         assert (second["excluded"], second["outdated"]) == (1, None)
         assert second["report"]["findings"][0] == {
             "code": "excluded",
@@ -102,9 +114,9 @@ def test_a_campaign_is_diagnosed_once(working: Server) -> None:
 def test_a_killed_server_leaves_no_process_and_takes_up_what_it_was_at(place: Place) -> None:
     """Diagnoses of a campaign and of several."""
     with running(place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
-        first, second = (begun(server, small(), name) for name in ("a", "b"))
+        first, second = (begun(server, small(), name, BESIDE_SKINS) for name in ("a", "b"))
         client.campaigns.post(resonant("another", preloads=(1.0,), lines=6, seed=3), skin="b")
-        both = client.skins.diagnose("b", without=beside("contact_resonance"))["id"]
+        both = client.skins.diagnose("b", without=MOST)["id"]
         awaited(server, first, "running")
         (ready,), (worker,) = await_workers(server, 1, "underskin-ready"), await_workers(server, 1)
         server.kill()
@@ -113,7 +125,7 @@ def test_a_killed_server_leaves_no_process_and_takes_up_what_it_was_at(place: Pl
     with running(place, **SEVERAL) as server:
         for diagnosis_id in (first, second):
             diagnosis = awaited(server, diagnosis_id)
-            assert (diagnosis["state"], diagnosis["report"]) == ("done", small_report())
+            assert (diagnosis["state"], diagnosis["report"]) == ("done", small_report(BESIDE_SKINS))
         together = awaited(server, both)
         assert (together["state"], len(together["campaign_ids"])) == ("done", 2)
         assert together["report"]["campaign"] == "b"
@@ -150,13 +162,13 @@ def test_cancelled_while_it_runs_and_while_it_waits(working: Server) -> None:
 def test_a_fork_server_is_kept_ready_and_replaced_when_it_is_killed(working: Server) -> None:
     """A worker that it has forked goes on without it."""
     (ready,) = await_workers(working, 1, "underskin-ready")
-    diagnosis_id = begun(working, small())
+    diagnosis_id = begun(working, small(), without=BESIDE_SKINS)
     (worker,) = await_workers(working, 1)
     assert _parent(str(worker))[0] == ready
     os.kill(ready, signal.SIGKILL)
     assert is_gone(ready)
     done = awaited(working, diagnosis_id)
-    assert (done["state"], done["report"]) == ("done", small_report())
+    assert (done["state"], done["report"]) == ("done", small_report(BESIDE_SKINS))
     assert is_gone(worker)
     (another,) = await_workers(working, 1, "underskin-ready")
     assert awaited(working, begun(working, small(), "finger"))["state"] == "done"

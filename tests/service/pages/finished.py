@@ -7,7 +7,7 @@ from typing import Any
 import orjson
 
 from service.store import database, diagnoses
-from tests.support.diagnosed import asked, resonant, sent, table
+from tests.support.diagnosed import MOST, asked, resonant, sent, table
 from tests.support.store_server import Server
 from underskin import __version__
 from underskin.diagnosis.pipeline import diagnose
@@ -29,7 +29,7 @@ class Made:
 @cache
 def made() -> Made:
     """Report and figures of `resonant`."""
-    found = diagnose(parse(resonant("array", lines=LINES)), table())
+    found = diagnose(parse(resonant("array", lines=LINES)), table(), without=MOST)
     told = report(found)
     plain = orjson.loads(orjson.dumps(told, option=orjson.OPT_SERIALIZE_NUMPY))
     return Made(plain, {name: figure.to_json() for name, figure in figures(found, told).items()})

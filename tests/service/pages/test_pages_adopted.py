@@ -13,10 +13,13 @@ from tests.support.store_server import Server
 
 
 def mistuned() -> dict[str, Any]:
-    """The report, as of a skin whose modulus was declared a fifth too high: d33 by it differs from the paper's."""
+    """The report of a search among all mechanisms, as of a skin whose modulus was declared a fifth too high.
+
+    d33 by it differs from the paper's.
+    """
     ratio = {"name": "modulus_factor", "unit": "-", "value": 0.8, "low": 0.79, "high": 0.81}
     found = {"name": "modulus_error", "probability": 0.97, "parameters": [ratio], "explains_percent": 90.0}
-    return {**report(), "mechanisms": [found]}
+    return {**report(()), "mechanisms": [found]}
 
 
 NOT_QUOTED = (

@@ -8,6 +8,7 @@ import pytest
 
 from tests.service.waiting import until
 from tests.support.diagnosed import awaited, begun, found, small, small_report
+from tests.support.lean_reports import BESIDE_SKINS
 from tests.support.postgres import Cluster
 from tests.support.store_server import Place, running
 from tests.support.streams import BATCH, Stream, check_kept
@@ -50,10 +51,10 @@ def test_what_either_acknowledged_is_kept_when_one_is_killed(places: list[Place]
 @pytest.mark.soak
 def test_a_diagnosis_of_a_killed_server_is_taken_over(places: list[Place]) -> None:
     with running(places[0], **_ONE) as first:
-        diagnosis_id = begun(first, small())
+        diagnosis_id = begun(first, small(), without=BESIDE_SKINS)
         awaited(first, diagnosis_id, "running")
         first.kill()
     with running(places[1], **_ONE) as second:
         assert found(second, diagnosis_id)["state"] == "running"
         done = awaited(second, diagnosis_id)
-        assert (done["state"], done["report"]) == ("done", small_report())
+        assert (done["state"], done["report"]) == ("done", small_report(BESIDE_SKINS))
