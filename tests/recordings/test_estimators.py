@@ -128,9 +128,10 @@ def estimated(recording: FrfRecording) -> Floats:
 
 def test_the_estimator_stays_with_the_recording_in_json_hdf5_and_the_template() -> None:
     campaign, _ = from_dict(document({**RECORDING, "estimator": "Hv"}))
-    assert to_dict(campaign)["recordings"][0]["estimator"] == "Hv"
+    written = to_dict(campaign)
+    assert written["recordings"][0]["estimator"] == "Hv"
     buffer = io.BytesIO()
-    hdf5_file.write(campaign, buffer)
+    hdf5_file.write_document(written, written["recordings"], buffer)
     (read,) = read_file(buffer.getvalue(), "a.h5").campaign.recordings
     assert isinstance(read, FrfRecording)
     assert read.estimator == "Hv"

@@ -17,7 +17,6 @@ from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 from tests.support.campaign_documents import FRF, document
 from tests.support.repository import ROOT
 from underskin.recordings import rig_description
-from underskin.recordings.campaign import parse
 from underskin.recordings.readers import hdf5_file
 from underskin.recordings.rig_description import RigDescription
 
@@ -41,7 +40,7 @@ def rig(**changes: Any) -> RigDescription:
 
 def hdf5(campaign_document: dict[str, Any]) -> bytes:
     buffer = io.BytesIO()
-    hdf5_file.write(parse(campaign_document), buffer)
+    hdf5_file.write_document(campaign_document, campaign_document["recordings"], buffer)
     return buffer.getvalue()
 
 

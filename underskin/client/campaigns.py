@@ -193,7 +193,7 @@ class Campaigns(Resource):
 
     def get(self, campaign_id: str) -> CampaignDetail:
         """A campaign and its recordings, without their arrays."""
-        return CampaignDetail.from_json(self._session.json("GET", _path(campaign_id)))
+        return self._asked(CampaignDetail, "GET", _path(campaign_id))
 
     def load(self, campaign_id: str) -> Campaign:
         """A campaign as it was sent, with its arrays."""
@@ -203,28 +203,24 @@ class Campaigns(Resource):
         """d33 by sensor, indenter and preload, over the flat zone or a given band, and what is left out."""
         low, high = (None, None) if band_hz is None else band_hz
         query = {"band_low_hz": low, "band_high_hz": high, "model": model}
-        return D33.from_json(self._session.json("GET", _path(campaign_id, "d33"), query))
+        return self._asked(D33, "GET", _path(campaign_id, "d33"), query)
 
     def withdraw(self, campaign_id: str, reason: str) -> CampaignDetail:
         """Exclude a campaign from all results; it can still be read."""
-        return CampaignDetail.from_json(
-            self._session.json("POST", _path(campaign_id, "withdraw"), json={"reason": reason})
-        )
+        return self._asked(CampaignDetail, "POST", _path(campaign_id, "withdraw"), json={"reason": reason})
 
     def exclude(self, campaign_id: str, recording: str, reason: str) -> CampaignDetail:
         """Exclude a recording from all results; it can still be read."""
         body = {"recording": recording, "reason": reason}
-        return CampaignDetail.from_json(self._session.json("POST", _path(campaign_id, "exclusions"), json=body))
+        return self._asked(CampaignDetail, "POST", _path(campaign_id, "exclusions"), json=body)
 
     def annotate(self, campaign_id: str, **fields: str | Sequence[str] | None) -> CampaignDetail:
         """Rename a campaign or change its notes or tags: `name`, `remark`, `tags`; what is not given stays."""
-        return CampaignDetail.from_json(self._session.json("PATCH", _path(campaign_id), json=fields))
+        return self._asked(CampaignDetail, "PATCH", _path(campaign_id), json=fields)
 
     def discard(self, campaign_id: str, reason: str) -> CampaignDetail:
         """Discard a trial that nothing builds on: withdrawn and in no list; it can still be read."""
-        return CampaignDetail.from_json(
-            self._session.json("POST", _path(campaign_id, "discard"), json={"reason": reason})
-        )
+        return self._asked(CampaignDetail, "POST", _path(campaign_id, "discard"), json={"reason": reason})
 
     def changes(self, campaign_id: str) -> list[Change]:
         """What was changed of a campaign, the latest first; `client.undo` takes a change back."""
@@ -240,20 +236,20 @@ class Skins(Resource):
 
     def get(self, skin_id: str) -> SkinDetail:
         """A skin, and the skins that were joined to it."""
-        return SkinDetail.from_json(self._session.json("GET", _skin(skin_id)))
+        return self._asked(SkinDetail, "GET", _skin(skin_id))
 
     def join(self, skin_id: str, other: str, reason: str) -> SkinDetail:
         """Count the skin `other` as `skin_id` from now on."""
         body = {"skin_id": other, "reason": reason}
-        return SkinDetail.from_json(self._session.json("POST", _skin(skin_id, "join"), json=body))
+        return self._asked(SkinDetail, "POST", _skin(skin_id, "join"), json=body)
 
     def annotate(self, skin_id: str, **fields: str | Sequence[str] | None) -> SkinDetail:
         """Name a skin or change its notes or tags: `title`, `remark`, `tags`; what is not given stays."""
-        return SkinDetail.from_json(self._session.json("PATCH", _skin(skin_id), json=fields))
+        return self._asked(SkinDetail, "PATCH", _skin(skin_id), json=fields)
 
     def discard(self, skin_id: str, reason: str) -> SkinDetail:
         """Discard a skin without campaigns in use: in no list until a campaign arrives for it."""
-        return SkinDetail.from_json(self._session.json("POST", _skin(skin_id, "discard"), json={"reason": reason}))
+        return self._asked(SkinDetail, "POST", _skin(skin_id, "discard"), json={"reason": reason})
 
     def changes(self, skin_id: str) -> list[Change]:
         """What was changed of a skin itself, the latest first; `client.undo` takes a change back."""
@@ -261,7 +257,7 @@ class Skins(Resource):
 
     def history(self, skin_id: str, *, model: ModelName = "paper") -> History:
         """d33 of each sensor over time, its trend, and what is left out."""
-        return History.from_json(self._session.json("GET", _skin(skin_id, "history"), {"model": model}))
+        return self._asked(History, "GET", _skin(skin_id, "history"), {"model": model})
 
     def diagnose(
         self,
@@ -278,21 +274,19 @@ class Skins(Resource):
         with the diagnosis that there is.
         """
         body = {"campaigns": None if campaigns is None else list(campaigns), "name": name, "without": list(without)}
-        return Asked.from_json(self._session.json("POST", _skin(skin_id, "diagnosis"), json=body))
+        return self._asked(Asked, "POST", _skin(skin_id, "diagnosis"), json=body)
 
     def adopt(self, skin_id: str, diagnosis_id: str) -> ModelEntry:
         """Adopt the model of an explained diagnosis for the skin; requests with the model `adopted` use it."""
-        return ModelEntry.from_json(
-            self._session.json("POST", _skin(skin_id, "model"), json={"diagnosis_id": diagnosis_id})
-        )
+        return self._asked(ModelEntry, "POST", _skin(skin_id, "model"), json={"diagnosis_id": diagnosis_id})
 
     def withdraw_model(self, skin_id: str, reason: str) -> ModelVersion:
         """Withdraw the adopted model; its version stays on record with date and reason."""
-        return ModelVersion.from_json(self._session.json("DELETE", _skin(skin_id, "model"), {"reason": reason}))
+        return self._asked(ModelVersion, "DELETE", _skin(skin_id, "model"), {"reason": reason})
 
     def model(self, skin_id: str) -> ModelEntry:
         """The model in force, with the campaign and the evidence that it comes from."""
-        return ModelEntry.from_json(self._session.json("GET", _skin(skin_id, "model")))
+        return self._asked(ModelEntry, "GET", _skin(skin_id, "model"))
 
     def models(self, skin_id: str) -> list[ModelEntry]:
         """All models that the skin ever had, the latest adoption first."""
@@ -315,7 +309,7 @@ class Skins(Resource):
         """Import a file that `export` wrote; `progress` is called with the bytes of each part that is sent."""
         headers = {"Content-Type": "application/octet-stream"}
         with CountedFile(Path(file), progress) as source:
-            return Imported.from_json(self._session.json("POST", "/v1/skins/import", headers=headers, content=source))
+            return self._asked(Imported, "POST", "/v1/skins/import", headers=headers, content=source)
 
 
 def _with_retries(send: Callable[[], _Answer]) -> _Answer:

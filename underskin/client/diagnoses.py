@@ -31,11 +31,11 @@ class Diagnoses(Resource):
         `without`: mechanisms to leave out of the catalogue, "suppose that it is not these".
         """
         body = {"json": {"without": list(without)}} if without else {}
-        return Asked.from_json(self._session.json("POST", path_of("campaigns", campaign_id, "diagnosis"), **body))
+        return self._asked(Asked, "POST", path_of("campaigns", campaign_id, "diagnosis"), **body)
 
     def get(self, diagnosis_id: str) -> Diagnosis:
         """A diagnosis: its `state` and `progress` and, once it is done, its `report`."""
-        return Diagnosis.from_json(self._session.json("GET", path_of("diagnoses", diagnosis_id)))
+        return self._asked(Diagnosis, "GET", path_of("diagnoses", diagnosis_id))
 
     def all(
         self,
@@ -74,7 +74,7 @@ class Diagnoses(Resource):
 
     def cancel(self, diagnosis_id: str) -> DiagnosisEntry:
         """Cancel a diagnosis; raises ServiceError (409) if it is done or has failed."""
-        return DiagnosisEntry.from_json(self._session.json("DELETE", path_of("diagnoses", diagnosis_id)))
+        return self._asked(DiagnosisEntry, "DELETE", path_of("diagnoses", diagnosis_id))
 
 
 class Fleets(Resource):
@@ -87,7 +87,7 @@ class Fleets(Resource):
         that have not changed is answered with the diagnosis that there is.
         """
         body = {"skins": list(skins), "name": name, "without": list(without)}
-        return Asked.from_json(self._session.json("POST", "/v1/fleets/diagnosis", json=body))
+        return self._asked(Asked, "POST", "/v1/fleets/diagnosis", json=body)
 
 
 class Mechanisms(Resource):
@@ -103,15 +103,13 @@ class Mechanisms(Resource):
     def keep(self, document: str) -> MechanismEntry:
         """Keep a document (`mechanism/1`, YAML) as one of the lab's own; raises ServiceError (409) for a taken name."""
         headers = {"Content-Type": "application/yaml"}
-        return MechanismEntry.from_json(
-            self._session.json("POST", "/v1/mechanisms", content=document.encode(), headers=headers)
-        )
+        return self._asked(MechanismEntry, "POST", "/v1/mechanisms", content=document.encode(), headers=headers)
 
     def keep_found(self, diagnosis_id: str, name: str, description: str | None = None) -> MechanismEntry:
         """Keep the law that a diagnosis found beside the catalogue; raises ServiceError (422) where it found none."""
         body = {"diagnosis_id": diagnosis_id, "name": name, "description": description}
-        return MechanismEntry.from_json(self._session.json("POST", "/v1/mechanisms", json=body))
+        return self._asked(MechanismEntry, "POST", "/v1/mechanisms", json=body)
 
     def discard(self, name: str) -> MechanismEntry:
         """Take one of the lab's own out of the catalogue; raises ServiceError (409) while a model in force needs it."""
-        return MechanismEntry.from_json(self._session.json("DELETE", path_of("mechanisms", name)))
+        return self._asked(MechanismEntry, "DELETE", path_of("mechanisms", name))

@@ -106,6 +106,12 @@ class Resource:
     def __init__(self, session: Session) -> None:
         self._session = session
 
+    def _asked(
+        self, kind: type[Item], method: str, path: str, params: Mapping[str, Any] | None = None, **options: Any
+    ) -> Item:
+        """The answer to a request, which is as `Session.answered` has it."""
+        return kind.from_json(self._session.json(method, path, params, **options))
+
 
 def path_of(noun: str, identity: str, *more: str) -> str:
     """The path of a campaign, skin or diagnosis, or of a resource below it."""

@@ -130,6 +130,7 @@ def array_map(
     plain = np.array([not reason for reason in reasons])
     radius, distance = radius_of(x, y, sensor_radius_mm), smallest_distance(x, y)
     inside = radius >= _WITH_ROOM * distance
+    bar = {"title": {"text": f"{quantity.name} [{quantity.unit}]", "side": "right"}}
     figure, below, unknown = go.Figure(), [], plain & ~away & ~np.isfinite(value)
     for name, mask in (
         ("differs", coloured & plain),
@@ -160,7 +161,7 @@ def array_map(
                     "size": 6,
                     "color": value[mask] if name == "differs" else [colours[row] for row in rows],
                     **({"colorscale": scale, "cmin": low, "cmax": high} if name == "differs" else {}),
-                    **({"colorbar": _bar(quantity)} if name == "differs" else {}),
+                    **({"colorbar": bar} if name == "differs" else {}),
                     "line": {"width": 0},
                 },
                 meta=meta,
@@ -286,10 +287,6 @@ def _below(sensors: Sequence[str], x: Floats, y: Floats) -> dict[str, Any]:
         "hoverinfo": "skip",
         "showlegend": False,
     }
-
-
-def _bar(quantity: Quantity) -> dict[str, Any]:
-    return {"title": {"text": f"{quantity.name} [{quantity.unit}]", "side": "right"}}
 
 
 def _id(name: str) -> str:

@@ -139,7 +139,8 @@ def design_region(
         ("resolves it, another limit is missed", resolved & ~feasible, _INFEASIBLE),
         ("meets the demand", feasible, None),
     ):
-        scale = _pitches(largest_pitch_mm[feasible]) if colour is None else _plain(colour)
+        plain = {"colorscale": [[0, colour], [1, colour]], "showscale": False}
+        scale = _pitches(largest_pitch_mm[feasible]) if colour is None else plain
         figure.add_heatmap(
             x=thickness_mm, y=sensor_radius_mm, z=np.where(mask, np.nan_to_num(largest_pitch_mm), np.nan), name=name,
             xgap=2, ygap=2, customdata=frf_pc_per_n, hoverongaps=False, showlegend=colour is not None, **scale,
@@ -162,8 +163,3 @@ def _pitches(pitches: Floats) -> dict[str, Any]:
     high = float(np.max(pitches, initial=0.0)) or 1.0
     low = min(float(np.min(pitches, initial=high)), (1 - _LEAST_SPAN) * high)
     return {"colorscale": "Cividis", "zmin": low, "zmax": high, "colorbar": _BAR}
-
-
-def _plain(colour: str) -> dict[str, Any]:
-    """One colour for all values."""
-    return {"colorscale": [[0, colour], [1, colour]], "showscale": False}

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from underskin.errors import InvalidInput, conflicting
-from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Parameter, Stage
+from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Stage
 from underskin.mechanisms.laws import misalignment
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
@@ -121,8 +121,9 @@ class AdoptedModel:
                 mechanisms = [*mechanisms, law]
                 values |= self.of_law
         model = forward_model(mechanisms, conditions, table, "frf")
-        fit = [_on_fit(parameter, values.get(parameter.name, 1.0)) for parameter in model.parameters]
-        predicted = model.predict(np.array(fit))
+        fit = [parameter.to_fit(values.get(parameter.name, 1.0)) for parameter in model.parameters]
+        bounds = np.array([parameter.bounds for parameter in model.parameters])
+        predicted = model.predict(np.clip(fit, *bounds.T))  # against rounding
         return Response(
             value=predicted.value.astype(np.complex128) / float(to_si("d33_pc_per_n", 1.0)),
             recording=model.recording,
@@ -224,11 +225,6 @@ def implausible_d33(report: Mapping[str, Any], *, units_checked: bool) -> str | 
     d33 = float(np.sqrt(interval["low"] * interval["high"]))
     implausible = plausibility.implausibility(d33, units_checked=units_checked)
     return None if implausible is None else f"{d33:.4g} pC/N, {implausible.words}"
-
-
-def _on_fit(parameter: Parameter, value: float) -> float:
-    """The fit coordinate, clipped to the bounds against rounding."""
-    return float(np.clip(parameter.to_fit(value), *parameter.bounds))
 
 
 def _levels(conditions: Conditions) -> Conditions:

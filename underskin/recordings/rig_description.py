@@ -103,10 +103,6 @@ class SignalMapping:
     sensitivity_unit: field.Name | None = None
 
 
-def _signal(name: str, value: Any, units_checked: bool) -> SignalMapping:
-    return field.build(SignalMapping, name, value, units_checked)
-
-
 def _or_property(name: str, value: Any, units_checked: bool) -> float | Property:
     if isinstance(value, Mapping):
         return field.build(Property, name, value, units_checked)
@@ -125,7 +121,7 @@ class ChannelMapping(SignalMapping):
     """
 
     stiffness_n_per_mm: Annotated[float | Property, _or_property] | None = None
-    deflection: Annotated[SignalMapping, _signal] | None = None
+    deflection: Annotated[SignalMapping, partial(field.build, SignalMapping)] | None = None
     spring_constant_n_per_m: Annotated[float | Property, _or_property] | None = None
     tare_percent: Annotated[float, _percent] | None = None
 

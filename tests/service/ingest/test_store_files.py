@@ -11,7 +11,6 @@ import orjson
 import pytest
 
 from tests.support.store_server import Place, Server, campaign, running
-from underskin.recordings.campaign import parse
 from underskin.recordings.readers import hdf5_file
 
 BACKEND = "postgresql"
@@ -29,7 +28,7 @@ CSV = "Z (mm);Load (N)\n0,0;0,0\n0,1;0,5\n0,2;1,4\n0,3;2,6\n"
 
 def hdf5(name: str) -> bytes:
     stream = io.BytesIO()
-    hdf5_file.write(parse(campaign(name)), stream)
+    hdf5_file.write_document(campaign(name), campaign(name)["recordings"], stream)
     return stream.getvalue()
 
 

@@ -340,12 +340,13 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     for step in steps:
         pair = step_amplitudes(force, charge, sample_rate, step, bad)
         if len(pair[0]):
-            lines.setdefault(_same_line(step.frequency, lines), []).append(pair)
+            alike = (line for line in lines if abs(line - step.frequency) < 1e-3 * step.frequency)
+            lines.setdefault(next(alike, step.frequency), []).append(pair)
     if not lines and defects:
         raise none_undamaged(defects)
     if not lines:
-        worst = max(("force_n", "charge_pc"), key=lambda name: sum(_samples(defect, name) for defect in defects))
-        of_worst = [defect for defect in defects if defect.channel == worst]
+        by_channel = {name: [one for one in defects if one.channel == name] for name in ("force_n", "charge_pc")}
+        worst, of_worst = max(by_channel.items(), key=lambda pair: sum(defect.samples for defect in pair[1]))
         kinds = "; ".join(dict.fromkeys(defect.kind.words for defect in of_worst))
         seen = f"{len(of_worst)} defects, samples that {kinds}" if of_worst else "no tone"
         raise unusable(worst, seen, "must dwell on a tone for some undamaged cycles")
@@ -369,16 +370,6 @@ def _without_switches(defects: Sequence[Defect], steps: Sequence[Step], sample_r
             if defect.kind == DefectKind.JUMP and 0 < step.last - defect.first_sample <= sample_rate / step.frequency:
                 switches[defect.channel, number] = defect
     return [defect for defect in defects if defect not in switches.values()]
-
-
-def _samples(defect: Defect, channel: str) -> int:
-    """The damaged samples of a channel."""
-    return defect.samples if defect.channel == channel else 0
-
-
-def _same_line(frequency: float, lines: dict[float, list[tuple[Complexes, Complexes]]]) -> float:
-    """The earlier line that this frequency repeats, or the frequency itself."""
-    return next((line for line in lines if abs(line - frequency) < 1e-3 * frequency), frequency)
 
 
 def _check(force: Floats, charge: Floats, sample_rate: float) -> None:

@@ -488,20 +488,21 @@ def choose_lines(measured: Frf) -> Choice:
     uncertainty, force = measured.relative_uncertainty, measured.force_power
     every = np.arange(len(measured.frequency))
     none = every[:0]
-    if uncertainty is None or np.isnan(uncertainty).any():
+    coherence, averages = measured.coherence, measured.averages
+    if uncertainty is None or coherence is None or averages is None or np.isnan(uncertainty).any():
         return Choice(every)
     if force is None:  # tones that the force dwells on: it has its power at each
         return Choice(every if (uncertainty <= _UNSURE).any() else none)
     usual = _usual(force)
     typical = float(np.median(uncertainty[force >= usual]))
     powerful = force >= usual * np.clip((typical / _UNSURE) ** 2, 1 / _TIMES_BEST**2, 1.0)
-    expected = _expected(measured, powerful)
+    expected = _expected(coherence[powerful], averages[powerful])
     if not (expected <= _UNSURE).any():  # no line by itself: those that follow together with the lines around
-        powerful[powerful] = _follows(measured, powerful)
+        powerful[powerful] = _follows(coherence[powerful], averages[powerful])
     else:
         powerful[powerful] = expected <= _UNSURE
     best = float(np.quantile(uncertainty[powerful], _BEST)) if powerful.any() else np.inf
-    powerful |= (uncertainty <= min(_SURE, _TIMES_BEST * best)) & _beyond_chance(measured)
+    powerful |= (uncertainty <= min(_SURE, _TIMES_BEST * best)) & _beyond_chance(coherence, averages)
     if not powerful.any():
         return Choice(none)
     mains = mains_on_charge(measured, powerful)
@@ -516,31 +517,25 @@ def choose_lines(measured: Frf) -> Choice:
     return Choice(chosen, np.flatnonzero(~powerful & (every >= (biased if shared else 0))), mains, uneven, once, shared)
 
 
-def _expected(measured: Frf, lines: Mask) -> Floats:
+def _expected(coherence: Floats, averages: Floats) -> Floats:
     """The expected relative uncertainty of each of these lines by γ² of the lines around."""
-    assert measured.coherence is not None
-    assert measured.averages is not None
-    around, count = expected_coherence(measured.coherence[lines]), measured.averages[lines]
-    true = np.maximum(around - (1 - around) ** 2 / count, 0.0)  # of n blocks γ² is that much too large
+    around = expected_coherence(coherence)
+    true = np.maximum(around - (1 - around) ** 2 / averages, 0.0)  # of n blocks γ² is that much too large
     with np.errstate(divide="ignore"):
-        return np.asarray(np.sqrt((1 - true) / (2 * count * true)))
+        return np.asarray(np.sqrt((1 - true) / (2 * averages * true)))
 
 
-def _beyond_chance(measured: Frf) -> Mask:
+def _beyond_chance(coherence: Floats, averages: Floats) -> Mask:
     """Where noise alone would not give this γ²: for n blocks it is exceeded with (1 − γ²)^(n − 1) (Carter 1987)."""
-    assert measured.coherence is not None
-    assert measured.averages is not None
-    return np.asarray((1 - measured.coherence) ** (measured.averages - 1) < _BY_CHANCE)
+    return np.asarray((1 - coherence) ** (averages - 1) < _BY_CHANCE)
 
 
-def _follows(measured: Frf, lines: Mask) -> Mask:
+def _follows(coherence: Floats, averages: Floats) -> Mask:
     """At which of these lines the mean γ² of the lines around is beyond chance: that of noise of n blocks has mean 1/n
     and variance (n − 1)/(n² (n + 1)) (Carter 1987)."""
-    assert measured.coherence is not None
-    assert measured.averages is not None
-    count, around = measured.averages[lines], uniform_filter1d(measured.coherence[lines], AROUND)
-    deviation = np.sqrt((count - 1) / (count + 1) * _CORRELATED / AROUND) / count
-    return np.asarray(around - 1 / count > _FOLLOWS * deviation + _MODEL)
+    around = uniform_filter1d(coherence, AROUND)
+    deviation = np.sqrt((averages - 1) / (averages + 1) * _CORRELATED / AROUND) / averages
+    return np.asarray(around - 1 / averages > _FOLLOWS * deviation + _MODEL)
 
 
 def _usual(power: Floats) -> float:

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from underskin.errors import ErrorCode, FileError
-from underskin.recordings.campaign import COLUMNS, SCHEMA, Campaign, to_dict
+from underskin.recordings.campaign import COLUMNS, SCHEMA
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers import hdf5_guard, variables
 
@@ -26,12 +26,6 @@ _TOLERANCES, _OF_SENSOR = "tolerances", ("id", "x_mm", "y_mm")
 MAGIC = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("unit", "units", "Unit", "Units")
 _OURS = ("campaign/", "skin-export/")
-
-
-def write(campaign: Campaign, stream: BinaryIO) -> None:
-    """Write the campaign into an open binary file."""
-    document = to_dict(campaign)
-    write_document(document, document["recordings"], stream)
 
 
 def write_document(about: Mapping[str, Any], recordings: Iterable[Mapping[str, Any]], file: Path | BinaryIO) -> None:

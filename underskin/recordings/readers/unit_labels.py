@@ -293,16 +293,13 @@ def contradicts(label: str, stated: str, heading: str, dimension: str) -> bool:
     labelled, meant = meanings(label), unit(stated)
     if label == "g":
         labelled += (Unit(*_GRAM_FORCE),)
-    if not labelled or (meant is not None and any(_same(meaning, meant) for meaning in labelled)):
+    alike = [meaning.to_si for meaning in labelled if meant is not None and meaning.dimension == meant.dimension]
+    if not labelled or (meant and any(math.isclose(size, meant.to_si, rel_tol=_ROUNDING) for size in alike)):
         return False
     if _is_marked(label, heading):
         return True
     dimensions = {dimension, DECIBEL, *(["voltage"] if len(label) > 1 else []), *([meant.dimension] if meant else [])}
     return any(meaning.dimension in dimensions for meaning in labelled)
-
-
-def _same(first: Unit, second: Unit) -> bool:
-    return first.dimension == second.dimension and math.isclose(first.to_si, second.to_si, rel_tol=_ROUNDING)
 
 
 def _is_marked(label: str, heading: str) -> bool:
