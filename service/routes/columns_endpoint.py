@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, TypeVar
@@ -80,8 +81,9 @@ def add_columns_route(
         if is_workbook(content_type):
             async with READING_SLOTS:
                 return await asyncio.to_thread(work)
-        # An adopted model is in the store, and the solved contact is tabulated once.
-        if len(body) <= _INLINE_BYTES and b"adopted" not in body and b"solved" not in body:
+        # An adopted model is in the store, the solved contact is tabulated once, and compiled code is loaded once.
+        is_short = len(body) <= _INLINE_BYTES and b"adopted" not in body and b"solved" not in body
+        if is_short and "underskin.surrogate.spline_kernel" in sys.modules:
             return work()
         return await heavy_answers.in_turn(work)
 

@@ -28,7 +28,7 @@ from service.store.tables import campaigns
 from service.store.tables import diagnoses as queue
 from service.usecases.scheduled_backups import OWNER, SKEW_S, foreign, newest, stored_backups
 from underskin import TableError
-from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
+from underskin.surrogate.sigma_table import SIGMA_TABLE, SigmaTable
 
 FILES_OPEN = "see that the disk answers, and that this user is the one that runs the server"
 _LITTLE_MB, _TOO_LITTLE_MB = 2000, 200
@@ -188,7 +188,7 @@ def _of_disk(settings: Settings) -> Iterator[Observation]:
 
 def _of_tables(folder: Path) -> Observation:
     try:
-        table = load_table(folder / SIGMA_TABLE)
+        table = SigmaTable(folder / SIGMA_TABLE)
     except (TableError, OSError) as error:
         return Observation("tables", Level.CRITICAL, str(error), "set UNDERSKIN_TABLES, or install underskin again")
     return Observation("tables", Level.OK, f"{folder / SIGMA_TABLE}, SHA-256 {table.sha256[:12]}…")

@@ -84,22 +84,6 @@ def test_samples_of_a_saturated_channel_are_left_out_and_named(corners: tuple[fl
     assert modulus_mpa(campaign(depth, force)) == pytest.approx(1.0, rel=0.02)
 
 
-@pytest.mark.parametrize("corners", [(-0.1, 0.3), (-0.1, 0.3, -0.1)])
-def test_saturated_displacement(corners: tuple[float, ...]) -> None:
-    """The sensor of the stage reads one number while the force goes on; a hold on a body that relaxes is no such."""
-    depth = ways(*corners)
-    finding = only(campaign(np.minimum(depth, 0.25), pressed(depth)))
-    assert finding.code == "displacement_saturates"
-    assert finding.arguments["samples"] == int((depth >= 0.25).sum())
-    assert modulus_mpa(campaign(np.minimum(depth, 0.25), pressed(depth))) == pytest.approx(1.0, rel=0.02)
-    held = ways(-0.1, 0.3, 0.3, -0.1)
-    for half in (3.0, 30.0, 300.0):
-        relaxed = 1 - 0.6 * (1 - np.exp(-np.clip(np.arange(len(held)) - np.argmax(held), 0, None) / half))
-        assert "displacement_saturates" not in [
-            one.code for one in implausible(campaign(held, pressed(held) * relaxed))
-        ]
-
-
 @pytest.mark.parametrize("corners", [(-0.1, 0.3, -0.1), (-0.1, 0.3, 0.3), (-0.1, 0.3, 0.3, 0.3, -0.1)])
 def test_a_quiet_zero_and_a_hold_hide_no_saturation(corners: tuple[float, ...]) -> None:
     """The air reads one value for long, and the stage may hold while the channel saturates."""

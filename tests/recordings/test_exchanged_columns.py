@@ -73,7 +73,8 @@ def test_a_diagnosis_names_exchanged_columns() -> None:
 
 
 def test_what_moves_like_that_by_physics_is_not_exchanged() -> None:
-    """A hold that relaxes before a way back; a force that is controlled; a drift before the press."""
+    """A hold that relaxes before a way back; a force that is controlled, on a stage that sticks first as well; a drift
+    before the press."""
     rng = np.random.default_rng(3)
     relaxing = np.concatenate([1 - 0.4 * (1 - np.exp(-np.arange(200) / 60)), np.linspace(0.6, 0.0, 100)])
     held = np.concatenate([np.full(200, 0.4), np.linspace(0.4, 0.1, 100)])
@@ -81,6 +82,10 @@ def test_what_moves_like_that_by_physics_is_not_exchanged() -> None:
     for displacement, force in (
         (held, relaxing),
         (controlled ** (2 / 3) + 1e-3 * rng.normal(size=300), controlled),
+        (
+            np.maximum(controlled - 0.2, 0) ** (2 / 3) + 1e-4 * rng.normal(size=300),
+            controlled + 1e-3 * rng.normal(size=300),
+        ),
         (controlled + 2e-2 * rng.normal(size=300), controlled),
     ):
         campaign = curve("in", 0.0, exchanged=False)

@@ -20,7 +20,6 @@ from underskin.findings.sentences import (
     contact_events,
     counted_negative,
     curves_differ,
-    displacement_saturates,
     elastomer,
     far_contacts,
     force_saturates,
@@ -250,7 +249,6 @@ ENGLISH: Mapping[Reason, Words] = {
     "the first"
     "{is_timed:, without its times, since a way out alone does not tell what relaxes|}",
     Reason.FORCE_SATURATES: force_saturates,
-    Reason.DISPLACEMENT_SATURATES: displacement_saturates,
     Reason.FORCE_STEPS: "the force leaps from {from_n:.4g} to {to_n:.4g} N at {at_mm:.4g} mm while the travel goes on "
     "evenly: the sample tore or slipped, or the range or zero of the cell was changed; the {samples} samples after it "
     "are not of the same contact or grip and were left out",

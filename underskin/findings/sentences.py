@@ -106,14 +106,6 @@ def force_saturates(percent: float, samples: int, limits_n: Sequence[float]) -> 
     )
 
 
-def displacement_saturates(percent: float, samples: int, limit_mm: float) -> str:
-    """A displacement channel at the end of its range."""
-    return (
-        f"the displacement channel saturates: {samples} samples, {percent:.2g} % of all, read {limit_mm:.4g} mm while "
-        "the force goes on; they were left out (place the sensor so that its range holds the press)"
-    )
-
-
 def contact_events(events: Mapping[str, Mapping[str, float | None]]) -> str:
     """Snap-in and pull-off of a sphere, with place, time and force."""
     parts = []

@@ -309,7 +309,7 @@ def are_exchanged(recording: CurveRecording) -> bool:
         return False
     travel, load = force[:end], displacement[:end]
     stands = _stands_first(load, travel)
-    if recording.has_sphere and stands > 0 and _is_uniform(travel):
+    if recording.has_sphere and stands > 0 and _is_uniform(travel) and _lags(load[stands:], travel[stands:]):
         return True  # whichever of the two is noisier
     if roughness(travel) / np.ptp(travel) > roughness(load) / max(np.ptp(load), 1e-300):
         return False
@@ -432,21 +432,6 @@ def _at_limit(travel: Floats, depth: Floats, below: Floats, air: float, width: f
     return at_limit if is_deep and _goes_on(travel, longest) else np.zeros_like(at_limit)
 
 
-def displacement_saturated(travel: Floats, force: Floats) -> Mask:
-    """Which samples (samples,) read the deepest travel, one and the same, while the force goes on as before it: in a
-    hold it does not."""
-    if not np.ptp(force) or not np.ptp(travel):
-        return np.zeros(len(force), dtype=bool)
-    load = np.abs(force - np.median(force[np.argsort(travel)[: max(int(_SHALLOW_SHARE * len(travel)), 1)]]))
-    ends = (travel.max(), travel.min())
-    deepest = max(ends, key=lambda end: float(np.median(load[travel == end])))
-    at_end = _at_limit(load, load, np.abs(travel - deepest), 0.0, 0.0)
-    rows = np.flatnonzero(at_end)
-    first = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)[0]
-    goes_on = len(first) >= _EQUAL and _keeps_pace(load[first], load[first[0] :: -1])
-    return at_end if goes_on else np.zeros_like(at_end)
-
-
 def _goes_on(travel: Floats, rows: Indices) -> bool:
     """Whether the travel keeps its speed at the first or the last of these samples at the limit."""
     first, last = int(rows[0]), int(rows[-1])
@@ -461,10 +446,9 @@ def _keeps_pace(inside: Floats, outside: Floats) -> bool:
     moved = np.abs(inside - inside[0])
     count = int(np.argmax(moved >= _MOST_OF_WAY * moved.max()))
     outside_count = min(count, len(outside) - 1)
-    if not outside_count:
-        return False
-    speed, pace = (inside[count] - inside[0]) / count, (outside[0] - outside[outside_count]) / outside_count
-    return bool(speed * np.sign(pace) > PACE * abs(pace))
+    return outside_count > 0 and bool(
+        moved[count] / count > PACE * abs(outside[outside_count] - outside[0]) / outside_count
+    )
 
 
 def _runs(travel: Floats, level: Floats) -> list[tuple[Indices, float]]:
@@ -552,21 +536,15 @@ def _without_saturation(
     curve: CurveRecording, finite: Indices, travel: Floats, force: Floats
 ) -> tuple[CurveRecording, list[Finding]]:
     at_limit, limits = saturated(travel, force, sphere=curve.has_sphere)
-    at_end = displacement_saturated(travel, force)
-    findings = []
-    if at_limit.any():
-        at_limits = {**_share(at_limit), "limits_n": sorted(limits)}
-        findings.append(Finding(Reason.FORCE_SATURATES, curve.id, "force_n", at_limits))
-    if at_end.any():
-        limit = {**_share(at_end), "limit_mm": float(travel[at_end][0])}
-        findings.append(Finding(Reason.DISPLACEMENT_SATURATES, curve.id, "displacement_mm", limit))
-    if not findings:
+    if not at_limit.any():
         return curve, []
-    return samples_of(curve, np.setdiff1d(np.arange(len(curve.force_n)), finite[at_limit | at_end])), findings
-
-
-def _share(samples: Mask) -> dict[str, float]:
-    return {"percent": 100 * float(samples.mean()), "samples": int(samples.sum())}
+    arguments = {
+        "percent": 100 * float(at_limit.mean()),
+        "samples": int(at_limit.sum()),
+        "limits_n": sorted(limits),
+    }
+    unsaturated = np.setdiff1d(np.arange(len(curve.force_n)), finite[at_limit])
+    return samples_of(curve, unsaturated), [Finding(Reason.FORCE_SATURATES, curve.id, "force_n", arguments)]
 
 
 def _without_steps(

@@ -207,8 +207,9 @@ class ContactTable(Table):
     """A verified table of the corrections, continued by their splines from the largest solved load to L = 0.222, which
     on a half space is a/R = 0.5.
 
-    Of 23 fresh solves at L from 0.15 to 0.256 the continuation errs by at most 0.05 % of σ and 0.3 % of its increment
-    (`tests/surrogate/test_contact_table.py`).
+    23 fresh solves at L from 0.15 to 0.256, among them some with c₂ 3 and 7, ν 0.3 and 0.44 and a sphere that sticks,
+    differ from the continuation by at most 0.05 % of σ and 0.3 % of its increment (of neo-Hookean layers:
+    `tests/surrogate/test_contact_table.py`).
 
     Attributes
     ----------
@@ -274,8 +275,8 @@ class ContactTable(Table):
     def softening_coefficients(self, a_over_h: Floats) -> Floats:
         """p0, p1 and p2 (…, 3) of δ/δ_linear − 1 = x (p0 + p1 x + p2 x²) at the same force, x = L^(1/3).
 
-        Within 2e-5 of the table at its nodes, and 2e-4 of solves up to L = 0.23; wider contacts have the value of the
-        last a/h.
+        Within 2e-5 of the table at its nodes, and of a paraboloid 2e-4 of solves up to L = 0.23; wider
+        contacts have the value of the last a/h.
         """
         return np.asarray(self._softening(np.minimum(a_over_h, self.axes[0][-1])))
 

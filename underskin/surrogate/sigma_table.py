@@ -406,9 +406,16 @@ class SigmaTable(ContactModel, Table):
 
 
 def load_table(path: Path | None = None) -> SigmaTable:
-    """The σ table at `path`, or the default one; raises TableError with the reason."""
+    """The σ table at `path`, or the default one; raises TableError with the reason.
+
+    It is read again where its file's time of change is another; `SigmaTable` reads it in any case.
+    """
     path = path or tables_folder() / SIGMA_TABLE
-    return _of_file(path, path.stat().st_mtime_ns if path.is_file() else 0)
+    try:
+        changed_ns = path.stat().st_mtime_ns
+    except OSError:
+        changed_ns = 0
+    return _of_file(path, changed_ns)
 
 
 @lru_cache(maxsize=1)

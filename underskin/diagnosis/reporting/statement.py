@@ -304,13 +304,7 @@ SLIPS = (
         FindingCode.GAIN_STEPS,
     ),
     FindingCode.WARM_UP,
-    *(
-        FindingCode.FORCE_SATURATES,
-        FindingCode.DISPLACEMENT_SATURATES,
-        FindingCode.READING_STEPS,
-        FindingCode.FORCE_STEPS,
-        FindingCode.PERIODIC_ERROR,
-    ),
+    *(FindingCode.FORCE_SATURATES, FindingCode.READING_STEPS, FindingCode.FORCE_STEPS, FindingCode.PERIODIC_ERROR),
     *(
         FindingCode.UNITS_OFF_BY_1000,
         FindingCode.CHANNELS_SWAPPED,
