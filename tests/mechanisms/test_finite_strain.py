@@ -48,8 +48,8 @@ def test_solved_force(radius: float, depths: list[float]) -> None:
 
 @pytest.mark.slow
 def test_solved_stiffening() -> None:
-    """Yeoh's layer is followed within 0.4 % by the stiffening of the neo-Hookean contact, with E within 1.5 %; taken as
-    stiffening of the linear contact it has E farther off by more than half."""
+    """Yeoh's layer is followed within 0.3 % by the stiffening of the neo-Hookean contact, with E within 1.5 %; taken as
+    stiffening of the linear contact it has E twice as far off."""
     depths = np.linspace(0.02, 0.16, 10)
     solved = solved_force(Material(c2=1.0), 1.0, depths)
 
@@ -59,9 +59,9 @@ def test_solved_stiffening() -> None:
         return force_of(["layered_contact", "strain_stiffening"], H_MM, H_MM * depths, share, **values) / solved - 1
 
     right, linear = (least_squares(misfit, [0.0, 1.0], args=(share,)) for share in (1.0, 0.0))
-    assert np.sqrt(np.mean(right.fun**2)) < 4e-3
+    assert np.sqrt(np.mean(right.fun**2)) < 3e-3
     assert abs(right.x[0]) < 0.015
-    assert abs(linear.x[0]) > 1.6 * abs(right.x[0])
+    assert abs(linear.x[0]) > 1.8 * abs(right.x[0])
 
 
 @pytest.mark.parametrize("stiffening", [None, Stiffening(*(np.full((1, 1, 1), value) for value in (0.5, 1.0, 2.0)))])
@@ -93,7 +93,7 @@ def test_share(stiffening: Stiffening | None, thickness: float | None) -> None:
 @pytest.mark.parametrize("names", [[], ["layered_contact"]])
 def test_depth_beyond_the_table(names: list[str]) -> None:
     """Beyond the table's load the correction stays, so that the force goes on without a kink."""
-    assert load_contact().contact_axes[1][-1] == pytest.approx(LARGEST_CBRT_LOAD, rel=1e-12)
+    assert load_contact().largest_solved == pytest.approx(LARGEST_CBRT_LOAD, rel=1e-12)
     depth = np.linspace(0.02, 1.2, 400)
     force = force_of(names, 2.0, depth, 1.0)
     assert (np.diff(force) > 0).all()

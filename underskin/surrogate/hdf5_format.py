@@ -219,6 +219,8 @@ class ContactTable(Table):
         Bound on the absolute error of the correction, in σ's scale.
     contact_radius, indentation, stiffness : ndarray, (a, L^(1/3))
         Over those of the linear layer at the same force.
+    largest_solved : float
+        The largest L^(1/3) that was solved; the nodes above it are continued.
     """
 
     schema = CONTACT_SCHEMA
@@ -226,6 +228,7 @@ class ContactTable(Table):
     def _take(self, data: Mapping[str, Floats]) -> None:
         state = {name.partition("/")[2]: values for name, values in data.items() if name.startswith(f"{_STATE}/")}
         a, x, r = state["a_over_h"], state["cbrt_load_parameter"], state["r_over_h"]
+        self.largest_solved = float(x[-1])
         self.axes = a, np.append(x, _LARGEST_CBRT_LOAD), r
         ratios = (_continued(x, state[name], 1) for name in ("contact_radius", "indentation", "stiffness"))
         self.contact_radius, self.indentation, self.stiffness = ratios
@@ -275,17 +278,16 @@ class ContactTable(Table):
     def softening_coefficients(self, a_over_h: Floats) -> Floats:
         """p0, p1 and p2 (…, 3) of δ/δ_linear − 1 = x (p0 + p1 x + p2 x²) at the same force, x = L^(1/3).
 
-        Within 2e-5 of the table at its nodes, and of a paraboloid 2e-4 of solves up to L = 0.23; wider
-        contacts have the value of the last a/h.
+        Within 2e-5 of the table at its nodes; wider contacts have the value of the last a/h.
         """
         return np.asarray(self._softening(np.minimum(a_over_h, self.axes[0][-1])))
 
     def softening(self, a_over_h: Floats, cbrt_load: Floats, full_sphere: bool) -> Floats:
-        """δ/δ_linear − 1 at the same force; larger L have the value of the last one.
+        """δ/δ_linear − 1 at the same force; L above the largest solved one have its value.
 
         The linear contact is that of a paraboloid, or with `full_sphere` of the full sphere.
         """
-        x = np.minimum(cbrt_load, self.axes[1][-1])
+        x = np.minimum(cbrt_load, self.largest_solved)
         p0, p1, p2 = np.moveaxis(self.softening_coefficients(a_over_h), -1, 0)
         return np.asarray(x * (p0 + x * (p1 - (FULL_SPHERE_OF_LOAD if full_sphere else 0.0) + x * p2)))
 

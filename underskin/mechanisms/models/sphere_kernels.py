@@ -27,7 +27,7 @@ _TOLERANCE = 3e-7  # of the contact radius, of the last step: the remaining erro
 _NO_CONTACT = 1e-15  # m, the radius without contact
 _EQUATOR, _PARABOLIC = 0.9995, 0.02  # a/R beyond which a contact grows no more, and below which a series is exact
 _LARGEST_CORRECTION = 0.25  # of a tangent's step, by which curvature may correct the next start
-LARGEST_CBRT_LOAD = 0.222 ** (1 / 3)  # L^(1/3) beyond which the correction is constant
+LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) beyond which the correction is constant
 
 Constants = tuple[float, float, float, float, float, float, float, float, float]  # the nine numbers of a body
 Four = tuple[float, float, float, float]
