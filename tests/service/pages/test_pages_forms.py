@@ -72,7 +72,7 @@ def test_a_design_outside_the_table_says_which_limit_and_what_is_old_is_grey(vis
     visitor.drawn(2)
     force = page.get_by_label("force F").last
     force.fill("900")
-    page.get_by_text("exceeds 0.15: at most 38.4 N").wait_for()
+    page.get_by_text("exceeds 0.222: at most 56.8 N").wait_for()
     shown = page.locator(".results").inner_text()
     assert "not resolved everywhere" not in shown
     assert "outside the table" in shown
