@@ -4,7 +4,7 @@ A test checks the mechanisms of this package against it; those of other packages
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeVar, get_args
 
@@ -14,11 +14,13 @@ from underskin.errors import InvalidInput, not_finite, not_unique
 from underskin.extensions import described
 from underskin.mechanisms import base
 from underskin.mechanisms.base import HeavyTailed, Kind, Mechanism, Normal, Origin, Parameter, Stage, Uniform
-from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
 from underskin.mechanisms.models.contact_state import joined
+from underskin.mechanisms.models.curves import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
+from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
@@ -157,7 +159,7 @@ def _check_numbers(mechanism: Mechanism, kind: Kind) -> None:
     if _result_of(f"unsupported ({kind})", lambda: mechanism.unsupported(campaign, kind)) is not None:
         return
     field = f"law ({kind})"
-    model = _result_of(field, lambda: forward_model([mechanism], campaign, load_table(), kind))
+    model = _result_of(field, lambda: _MODELS[kind](mechanism, campaign))
     count = len(_parameters(mechanism, kind))
     points = list(_points(model.parameters[:count], model.parameters[count:]))
     values = []
@@ -188,6 +190,13 @@ def _check_several_points(model: FrfModel, fits: Floats, field: str) -> None:
                 batch_part.value, single_part.value, 1e-9, 0, equal_nan=True
             )
             _require(f"{field} at several points", None, same, allowed)
+
+
+_MODELS: Mapping[Kind, Callable[[Mechanism, Campaign], FrfModel | IndentationModel | CompressionModel]] = {
+    "frf": lambda mechanism, campaign: FrfModel([mechanism], campaign, load_table()),
+    "indentation": lambda mechanism, campaign: IndentationModel([mechanism], campaign),
+    "compression": lambda mechanism, campaign: CompressionModel([mechanism], campaign),
+}
 
 
 def _points(parameters: Sequence[Parameter], nuisances: Sequence[Parameter]) -> Iterator[tuple[Floats, str]]:
